@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import polars as pl
 import pytest
 from yielding_arm import YieldingArm, touches
@@ -34,6 +35,10 @@ def touched_tip(run, arm: YieldingArm, robot: Path, *, first: bool = False) -> n
     """Copy the line of `identify tool` into robot.yaml, before the reflector's or after it; the tip's place in it, m."""
     places = [("p", np.array([0.75, 0.1, 0.6]))] * 14
     file = touches(arm, robot.with_name("touches.csv"), places, np.random.default_rng(3))
+    found = run("identify", "tool", robot, file, "--frame", "tool0", "--json").document
+    error, half, own = (np.array(found[key]) for key in ("xyz_m", "half_width_m", "own_half_width_m"))
+    assert (np.abs(error - arm.tip) <= half).all()
+    assert own.max() < 1e-4 < half.min()
     outcome = run("identify", "tool", robot, file, "--frame", "tool0")
     assert outcome.status == 0, outcome.err
     line = re.search(r"points: \{(tip: \{.*\})\}", outcome.out)
@@ -67,10 +72,45 @@ def missed(run, arm: YieldingArm, robot: Path) -> np.ndarray:
     return np.linalg.norm(real - there - (wanted - centre) @ turn.T, axis=1)
 
 
+def said_by_others(run, arm: YieldingArm, robot: Path) -> dict[str, np.ndarray]:
+    """The same in other verbs: where the tip is by the exported URDF, what a filtered program commands, and where a work object lies, m."""
+    q, tip = arm.postures(10, np.random.default_rng(9), 0.6), np.array(arm.tip)
+    outcome = run("export", "urdf", robot, "--out", robot.with_name("exported.urdf"))
+    assert outcome.status == 0, outcome.err
+    model = pin.buildModelFromUrdf(str(robot.with_name("exported.urdf")))
+    data, frame, exported = model.createData(), model.getFrameId("tip"), []
+    for row in q:
+        pin.framesForwardKinematics(model, data, row)
+        exported.append(data.oMf[frame].translation.copy())
+    lines = "".join(f"  movej([{', '.join(f'{x:.12f}' for x in row)}], a=1, v=1)\n" for row in q)
+    tool = ", ".join(f"{x:.9f}" for x in (*tip, 0, 0, 0))
+    robot.with_name("p.script").write_text(f"def p():\n  set_tcp(p[{tool}])\n{lines}end\n")
+    new = robot.with_name("new.script")
+    outcome = run("filter", robot, robot.with_name("p.script"), "--out", new)
+    assert outcome.status == 0, outcome.err
+    rows = re.findall(r"movej\(\[(.*?)\]", new.read_text())
+    commanded = np.array([[float(x) for x in row.split(",")] for row in rows])
+    assert np.linalg.norm(arm.at(commanded, tip) - arm.at(q, tip), axis=1).min() > 1e-4
+    places = [("origin", [0.7, 0.1, 0.6]), ("x", [0.85, 0.1, 0.6]), ("xy", [0.75, 0.25, 0.6])]
+    file = touches(
+        arm,
+        robot.with_name("object.csv"),
+        [(name, np.array(at)) for name, at in places],
+        np.random.default_rng(4),
+    )
+    found = run("identify", "frame", robot, file, "--point", "tip", "--json").document
+    return {
+        "exported": np.array(exported),
+        "filtered": arm.at(commanded, tip),
+        "frame": np.array(found["xyz_m"]),
+        "frame_axes": 0.2 * np.array(found["rpy_rad"]),
+    }
+
+
 @pytest.mark.parametrize("first", [False, True], ids=["after", "before"])
 def test_the_tip_is_the_same_wherever_the_reflector_was_declared(tmp_path: Path, run, first: bool) -> None:
     """Calibrated, touched, and the line copied before or after the reflector's, which `tool.length_x` stays the error of."""
-    places, reached = [], []
+    places, reached, others = [], [], []
     q = YieldingArm().postures(20, np.random.default_rng(8))
     for off in OFFS:
         for written in (False, True):
@@ -80,9 +120,12 @@ def test_the_tip_is_the_same_wherever_the_reflector_was_declared(tmp_path: Path,
             reached.append(
                 [point_kinematics(model, q, point=name, jacobians=False).position for name in ("tip", "smr")]
             )
+            others.append(said_by_others(run, arm, robot))
             assert np.median(missed(run, arm, robot)) < 3e-4
     assert np.abs(np.array(places) - places[0]).max() < 1e-5
     assert np.abs(np.array(reached) - reached[0]).max() < 1e-5
+    for name, first_said in others[0].items():
+        assert np.abs(np.array([said[name] for said in others]) - first_said).max() < 1e-5, name
 
 
 def test_a_calibration_whose_point_is_gone_is_refused(tmp_path: Path, run) -> None:

@@ -80,17 +80,18 @@ def is_calibrated(model: RobotModel) -> bool:
     )
 
 
-def arm_errors(frames: TouchedFrames, *, tool: bool) -> ArmErrors:
+def arm_errors(frames: TouchedFrames, *, tool: bool, gauge: bool = True, scatter: bool = True) -> ArmErrors:
     """Errors of the point of these frames.
 
-    Of a calibrated robot the covariance of its parameters and its scatter are propagated. Of another robot every joint has errors of an
-    unknown common size, in proportion to what robot.yaml declares under `prior:` or else to the tolerances of manufacture. Errors that
-    move the whole robot as one, at the base, change nothing that the robot does with what it touched, and count for nothing; with `tool`
-    those that the place of the point on the tool takes up do count.
+    Of a calibrated robot the covariance of its parameters and, with `scatter`, its scatter are propagated. Of another robot every joint has
+    errors of an unknown common size, in proportion to what robot.yaml declares under `prior:` or else to the tolerances of manufacture.
+    Errors that move the whole robot as one, at the base, change nothing that the robot does with what it touched, and count for nothing;
+    with `tool` those that the place of the point on the tool takes up do count. Without `gauge` the posterior has none of these, and all of
+    it counts.
     """
     model, touches = frames.model, frames.touches
     joints = model.moving(model.point(frames.point).joint)
-    rigid = _rigid_names(model, joints, frames.point, tool=tool)
+    rigid = _rigid_names(model, joints, frames.point, tool=tool) if gauge else set()
     calibrated = is_calibrated(model)
     known = [
         name for name in moving_parameters(model) if model.posterior.determines(name) and name not in rigid
@@ -107,7 +108,7 @@ def arm_errors(frames: TouchedFrames, *, tool: bool) -> ArmErrors:
         std = {name: _typical_size(model, name) for name in names if name not in rigid}
         columns.append(prediction.jacobian(list(std)).reshape(rows, -1) * np.array(list(std.values())))
     shared = np.concatenate(columns, axis=1)
-    covariance = shared @ shared.T + (_scatter(prediction) if calibrated else 0.0)
+    covariance = shared @ shared.T + (_scatter(prediction) if calibrated and scatter else 0.0)
     weights = np.exp(-0.5 * (np.log(_SIZES) / np.log(_FACTOR)) ** 2)
     sizes = {1.0: 1.0} if calibrated else dict(zip(_SIZES.tolist(), weights.tolist(), strict=True))
     angles = [size for name, size in std.items() if unit_in(model, name) == "rad"]

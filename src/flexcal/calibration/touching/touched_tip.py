@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from flexcal.calibration.touching.touch_fit import TouchFit, residual_rms, witho
 from flexcal.data.poses import Touches
 from flexcal.errors import FlexcalError
 from flexcal.estimation import consistent_groups, fit_two_variances
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import Posterior, RobotModel
 from flexcal.units import DEGREE
 
 LEAST_TOUCHES = 3
@@ -31,10 +31,13 @@ class TipFit(TouchFit):
         Names of the fixed points.
     turn : float
         Root-mean-square rotation of the frame about the axis about which it turned least, rad.
+    flange : ndarray
+        Covariance (3, 3), m², of the place of the real flange in that of the calibrated robot, which the calibration did not see.
     """
 
     points: tuple[str, ...]
     turn: float
+    flange: np.ndarray
 
     @property
     def xyz(self) -> np.ndarray:
@@ -42,10 +45,11 @@ class TipFit(TouchFit):
         return self.fit.values[:3]
 
 
-def fit_tip(model: RobotModel, touches: Touches, point: str) -> TipFit:
+def fit_tip(model: RobotModel, touches: Touches, point: str, unseen: Posterior | None = None) -> TipFit:
     """Fit the tip t and the fixed points c to p + R t = c, for poses p, R of the frame of the point `point` of the model, whose `xyz` is 0.
 
     Linear least squares (the sphere fit of tool calibration by touching one point), with the errors of the arm as correlated errors.
+    `unseen` is the part of the posterior that a calibration did not see: its errors move the flange, and count for the frame alone.
     Raises `FlexcalError` for too few touches, and for rotations that do not determine the tip, with the missing motion.
     """
     points = tuple(sorted(set(touches.touched.tolist())))
@@ -57,17 +61,26 @@ def fit_tip(model: RobotModel, touches: Touches, point: str) -> TipFit:
     _require_turns(frames.rotation, numbers, "")
     groups = np.repeat(np.arange(len(touches)), 3)
     xyz = np.linalg.lstsq(design, observed, rcond=None)[0][:3]
-    arm = _errors_at(model, touches, point, xyz)
+    hidden = None if unseen is None else replace(model, posterior=unseen)
+    if unseen is not None:
+        seen = replace(model.posterior, covariance=model.posterior.covariance - unseen.covariance)
+        model = replace(model, posterior=seen)
+    arm = _errors_at(model, touches, point, xyz, gauge=unseen is None)
     kept = consistent_groups(design, observed, arm.covariance, arm.sizes, groups, numbers)
     turn = _require_turns(frames.rotation[kept], numbers[kept], without(touches, kept))
     rows = kept[groups]
     block = np.ix_(rows, rows)
     first = fit_two_variances(design[rows], observed[rows], arm.covariance[block], arm.sizes)
-    arm = _errors_at(model, touches, point, first.values[:3])
+    arm = _errors_at(model, touches, point, first.values[:3], gauge=unseen is None)
     fit = fit_two_variances(design[rows], observed[rows], arm.covariance[block], arm.sizes)
     errors = (design @ fit.values - observed).reshape(-1, 3)
     arm_rms = fit.size * residual_rms(design[rows], arm.covariance[block], int(kept.sum()))
-    return TipFit(fit, errors, kept, arm, arm_rms, points, turn)
+    flange = np.zeros((3, 3))
+    if hidden is not None:
+        moved = _errors_at(hidden, touches, point, fit.values[:3], gauge=False, scatter=False)
+        pull = np.linalg.pinv(design[rows])[:3]
+        flange = pull @ moved.covariance[block] @ pull.T
+    return TipFit(fit, errors, kept, arm, arm_rms, points, turn, flange)
 
 
 def _design(rotation: np.ndarray, touched: np.ndarray, points: tuple[str, ...]) -> np.ndarray:
@@ -78,9 +91,13 @@ def _design(rotation: np.ndarray, touched: np.ndarray, points: tuple[str, ...]) 
     return design.reshape(3 * len(rotation), -1)
 
 
-def _errors_at(model: RobotModel, touches: Touches, point: str, xyz: np.ndarray) -> ArmErrors:
+def _errors_at(
+    model: RobotModel, touches: Touches, point: str, xyz: np.ndarray, *, gauge: bool, scatter: bool = True
+) -> ArmErrors:
     values = {f"point.{point}.{axis}": float(value) for axis, value in zip("xyz", xyz, strict=True)}
-    return arm_errors(touched_frames(model.with_values(values), touches, point), tool=False)
+    return arm_errors(
+        touched_frames(model.with_values(values), touches, point), tool=False, gauge=gauge, scatter=scatter
+    )
 
 
 def _require_enough(touches: Touches, points: tuple[str, ...]) -> None:

@@ -30,7 +30,7 @@ def identify_frame(
     Raises `FlexcalError` as reading and `identify_work_object` do; nothing is written then.
     """
     require_distinct_files(files)
-    model = probable_model(robot_file, estimates)
+    model, _ = probable_model(robot_file, estimates)
     given = read_frame_touches(list(files), model)
     found = identify_work_object(model, given, point=point, name=name, tip_radius=tip_radius)
     found = replace(found, record=RunRecord(provenance([robot_file, model.urdf, *files]), command))

@@ -17,6 +17,7 @@ from flexcal.model.robot import (
     DECLARED,
     TARGETS,
     TARGETS_BETWEEN,
+    Posterior,
     RobotModel,
     declared_sha256,
     with_blocks,
@@ -221,18 +222,19 @@ def measured_points(nominal: RobotModel, blocks: Mapping[Block, Estimate]) -> tu
     return tuple(dict.fromkeys([*list(nominal.points)[:1], *further]))
 
 
-def probable_model(path: Path, estimates: Path | None = None) -> RobotModel:
+def probable_model(path: Path, estimates: Path | None = None) -> tuple[RobotModel, Posterior | None]:
     """The robot of a robot.yaml with its estimates, for frames that were not measured: a calibrated one as in `CalibratedRobot.probable`.
 
-    `estimates` are as in `stored_estimates`; without any, the nominal robot. Raises `FlexcalError` as reading does.
+    With it the part of its posterior that the measured points left open; None without a calibration of points. `estimates` are as in
+    `stored_estimates`; without any, the nominal robot. Raises `FlexcalError` as reading does.
     """
     nominal = RobotModel.from_yaml(path, estimates=False)
     stored = stored_estimates(nominal, estimates)
     if estimates is None and not stored.exists():
-        return nominal
+        return nominal, None
     blocks = read_estimates(stored)
     robot = CalibratedRobot(nominal, with_blocks(nominal, blocks, stored), blocks, stored)
-    return robot.probable if "calibration" in blocks else robot.model
+    return (robot.probable, robot.unseen.posterior) if robot.measured else (robot.probable, None)
 
 
 def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:

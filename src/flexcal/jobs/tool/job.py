@@ -29,8 +29,8 @@ def identify_tool(
     Raises `FlexcalError` as reading and `identify_tip` do; nothing is written then.
     """
     require_distinct_files(files)
-    model = probable_model(robot_file, estimates)
-    found = identify_tip(model, read_touches(list(files), model), frame=frame, name=name)
+    model, unseen = probable_model(robot_file, estimates)
+    found = identify_tip(model, read_touches(list(files), model), frame=frame, name=name, unseen=unseen)
     found = replace(found, record=RunRecord(provenance([robot_file, model.urdf, *files]), command))
     if out is not None:
         write_results(out, found.document())

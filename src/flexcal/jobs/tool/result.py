@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.calibration.touching import TipFit
 from flexcal.jobs.result_files import header
 from flexcal.jobs.touching import TouchIdentification, half_widths, millimetres
-from flexcal.units import DEGREE
+from flexcal.units import DEGREE, MILLIMETRE
 
 _FEW = 5
 """Number of touches of a point below which a wrong one cannot be told from the others."""
@@ -47,7 +47,12 @@ class ToolIdentification(TouchIdentification):
 
     @property
     def half_width(self) -> np.ndarray:
-        """Half widths (3,) of the intervals of 95 %, m."""
+        """Half widths (3,) of the intervals of 95 %, m, in the frame of the real robot."""
+        return np.hypot(self.own_half_width, _NORMAL * np.sqrt(np.diag(self.fit.flange)))
+
+    @property
+    def own_half_width(self) -> np.ndarray:
+        """The same in the frame as the robot of robot.yaml and its estimates has it, which commands and exports use, m."""
         return half_widths(self.fit.fit)[:3]
 
     @property
@@ -59,7 +64,8 @@ class ToolIdentification(TouchIdentification):
     def lines(self) -> list[str]:
         """The line for robot.yaml."""
         place, std = (
-            ", ".join(f"{value:.6f}" for value in values) for values in (self.xyz, self.half_width / _NORMAL)
+            ", ".join(f"{value:.6f}" for value in values)
+            for values in (self.xyz, self.own_half_width / _NORMAL)
         )
         return [f"points: {{{self.name}: {{frame: {self.frame}, xyz: [{place}], std: [{std}]}}}}"]
 
@@ -77,6 +83,12 @@ class ToolIdentification(TouchIdentification):
                 f"the tool turned by {fit.turn / DEGREE:.1f}° only about the axis about which it turned least; turn it by 30° or more "
                 "about two axes for a narrower interval"
             )
+        if fit.flange.any():
+            own = ", ".join(f"{value / MILLIMETRE:.2f}" for value in self.own_half_width)
+            said.append(
+                f"the line for robot.yaml is in {self.frame} as this calibration has it, as commands and exports are; there the tip is "
+                f"known to ± ({own}) mm. How {self.frame} lies on the last link no measured point tells, which widens the interval"
+            )
         said.append("the orientation of the tool cannot be told from points; it is that of the frame")
         return said
 
@@ -89,6 +101,7 @@ class ToolIdentification(TouchIdentification):
             "frame": self.frame,
             "xyz_m": self.xyz,
             "half_width_m": self.half_width,
+            "own_half_width_m": self.own_half_width,
             "degrees_of_freedom": self.fit.fit.freedom,
             **self.residual_document(),
             "turn_deg": self.fit.turn / DEGREE,
