@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from flexcal.export import export_urdf
+from flexcal.export.urdf import render_urdf
 from flexcal.model.robot import GEOMETRY, RobotModel
 
 Kinematics = Callable[[np.ndarray], np.ndarray]
@@ -28,12 +27,11 @@ def erroneous() -> Callable[[RobotModel, float], RobotModel]:
 
 
 @pytest.fixture
-def pinocchio_of(tmp_path: Path) -> Callable[[RobotModel], Kinematics]:
-    """Frames (N, 4, 4) of the first point of a robot, by Pinocchio from its exported URDF."""
+def pinocchio_of() -> Callable[[RobotModel], Kinematics]:
+    """Frames (N, 4, 4) of the first point of a robot, by Pinocchio from a URDF with its geometry."""
 
     def make(model: RobotModel) -> Kinematics:
-        export = export_urdf(model, tmp_path / "for_pinocchio.urdf")
-        read = pin.buildModelFromUrdf(str(export.path))
+        read = pin.buildModelFromXML(render_urdf(model).text)
         data, frame = read.createData(), read.getFrameId(model.point().name)
 
         def frames(q: np.ndarray) -> np.ndarray:

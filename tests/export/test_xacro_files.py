@@ -6,6 +6,7 @@ import os
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from refusals import refused
 from xacro_robots import CONTROLLED, XMLNS, expanded, write_files
@@ -134,4 +135,5 @@ def test_numbers_and_structure_are_checked_where_they_are_written(
     (tmp_path / "arm.xacro").write_text(CONTROLLED.replace(right, wrong))
     calibrated = model.with_values({"pan.offset": 0.01, "lift.offset": 0.01})
     with refused(*refusal):
-        render_xacro(calibrated, model, XacroSource(tmp_path / "arm.xacro", {}, {}), "ros2_control")
+        export = render_xacro(calibrated, model, XacroSource(tmp_path / "arm.xacro", {}, {}), "ros2_control")
+        export.tool(np.zeros((1, model.n)))

@@ -11,7 +11,7 @@ import yaml
 from refusals import refused
 from xacro_robots import CONTROLLED, JOINT_LIMITS, expanded, link_poses, write_files
 
-from flexcal.export import XacroSource, render_xacro, shifted_limits
+from flexcal.export import XacroSource, measure_export_error, render_xacro, shifted_limits
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 
@@ -73,7 +73,8 @@ def test_measured_positions_give_the_true_pose_and_commands_reach_it(
         true = point_kinematics(wrong, q[None], jacobians=False)
         np.testing.assert_allclose(at[:3, :3] @ [0.1, 0, 0] + at[:3, 3], true.position[0], atol=1e-9)
         np.testing.assert_allclose(after.command(positions), motors, atol=1e-15)
-    assert export.loss.error is not None and export.loss.error.max < 1e-9
+    error = measure_export_error(wrong, export.tool, ()).error
+    assert error is not None and error.max < 1e-9
 
 
 def test_the_offset_is_in_one_place_and_limits_stay_on_the_arm(servo: RobotModel, tmp_path: Path) -> None:

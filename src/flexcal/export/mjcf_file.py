@@ -10,6 +10,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.export.actuators import Actuators
+from flexcal.export.geometry_fit import render_representable
 from flexcal.export.mujoco_spec import GAP, has_gap, mjcf_spec
 from flexcal.export.representation_error import (
     BACKLASH,
@@ -33,6 +34,8 @@ _AT_REST = 1e-12
 
 def export_mjcf(model: RobotModel, path: str | Path) -> ExportedFile:
     """Write a robot as MJCF with elastic joints, and measure the error due to the terms that the format lacks; see `render_mjcf`.
+
+    Where it lacks some, the geometry is that with which the points come nearest to those of the robot at rest.
 
     Parameters
     ----------
@@ -61,7 +64,7 @@ def export_mjcf(model: RobotModel, path: str | Path) -> ExportedFile:
     ...     export_mjcf(model, f"{folder}/ur5.xml").lost
     ()
     """
-    return write_rendered(model, path, render_mjcf(model))
+    return write_rendered(model, path, render_representable(model, render_mjcf))
 
 
 def render_mjcf(model: RobotModel, actuators: Actuators | None = None) -> RenderedModel:

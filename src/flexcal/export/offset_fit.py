@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.export.representation_error import PositionErrors, random_poses, tool_positions
+from flexcal.export.representation_error import (
+    DrawPoses,
+    PositionErrors,
+    poses_of,
+    random_poses,
+    tool_positions,
+)
 from flexcal.model.kinematics import motor_motion, point_kinematics
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import RobotModel, propagated_covariance_root
@@ -48,18 +54,20 @@ def fit_offsets(
     *,
     keep_frames: bool,
     undetermined: Collection[int] = (),
+    draw: DrawPoses | None = None,
 ) -> OffsetFit:
     """Least squares of the tool error between `model` at rest and `nominal` with offsets, base and tool, over random poses.
 
-    The poses are those of the working volume where one is declared. With `keep_frames` base and tool stay. The standard deviations are
+    The poses are those of `draw`, as `poses_of` takes it. With `keep_frames` base and tool stay. The standard deviations are
     those that the covariance of the model's parameters gives, to first order. Offsets of the joints `undetermined` are held at zero, and so
     are those that are known less well than a joint is made and do not differ from zero by two standard deviations.
     """
     fixed = np.isin(np.arange(model.n), sorted(undetermined))
-    fit = _fit(model, nominal, point, fixed, keep_frames=keep_frames)
+    q, _ = poses_of(model, draw)(point, np.random.default_rng(1))
+    fit = _fit(model, nominal, q, point, fixed, keep_frames=keep_frames)
     made = np.array([_MADE_WITHIN[joint.kind] for joint in model.motor_joints])
     weak = ~fixed & (fit.std > made) & (np.abs(fit.offsets) < 2 * fit.std)
-    return _fit(model, nominal, point, fixed | weak, keep_frames=keep_frames) if weak.any() else fit
+    return _fit(model, nominal, q, point, fixed | weak, keep_frames=keep_frames) if weak.any() else fit
 
 
 def undetermined_offsets(nominal: RobotModel, points: Sequence[str], *, base: bool) -> tuple[int, ...]:
@@ -81,26 +89,39 @@ def undetermined_offsets(nominal: RobotModel, points: Sequence[str], *, base: bo
 
 
 def _fit(
-    model: RobotModel, nominal: RobotModel, point: str, fixed: np.ndarray, *, keep_frames: bool
+    model: RobotModel,
+    nominal: RobotModel,
+    q: np.ndarray,
+    point: str,
+    fixed: np.ndarray,
+    *,
+    keep_frames: bool,
 ) -> OffsetFit:
-    """Fit without the offsets `fixed` (n,) at zero."""
-    q, _ = random_poses(model, point, np.random.default_rng(1))
+    """Fit at poses `q` (N, n) without the offsets `fixed` (n,) at zero."""
     targets, flank = tool_positions(model, q, point=point)
     n = model.n
     free = _free(n, frames=not keep_frames) & ~np.concatenate([fixed, np.zeros(9, dtype=bool)])
     fitted = _solve(nominal, q, targets, point, free)
-    still = _solve(nominal, q, targets, point, free & (np.arange(n + 9) >= n))
     columns = _columns(nominal, q, fitted, point, free)
     spread = propagated_covariance_root(
         model, lambda m: tool_positions(m, q, point=point, flank=flank)[0].ravel()
     )
     rows = np.vstack([columns, _rest_rows(n, len(q))])
-    response = _least_squares(rows, np.vstack([spread, np.zeros((9, spread.shape[1]))]))
+    response = least_squares(rows, np.vstack([spread, np.zeros((9, spread.shape[1]))]))
     std = np.linalg.norm(response, axis=1)
-    before = PositionErrors.of(targets - offset_tool(nominal, q, still, point))
+    before = nominal_error(nominal, q, targets, point, keep_frames=keep_frames)
     return OffsetFit(
         np.where(fixed, 0.0, fitted[:n]), std[:n], ~fixed, fitted[n : n + 6], fitted[n + 6 :], before
     )
+
+
+def nominal_error(
+    nominal: RobotModel, q: np.ndarray, targets: np.ndarray, point: str, *, keep_frames: bool = False
+) -> PositionErrors:
+    """Error of the nominal robot at `q` (N, n) against `targets` (N, 3), m, its base and tool fitted unless `keep_frames`."""
+    free = (np.arange(nominal.n + 9) >= nominal.n) & (not keep_frames)
+    frames = _solve(nominal, q, targets, point, free)
+    return PositionErrors.of(targets - offset_tool(nominal, q, frames, point))
 
 
 def offset_tool(nominal: RobotModel, q: np.ndarray, parameters: np.ndarray, point: str) -> np.ndarray:
@@ -110,16 +131,6 @@ def offset_tool(nominal: RobotModel, q: np.ndarray, parameters: np.ndarray, poin
     at = point_kinematics(nominal, q + parameters[:n], point=point, jacobians=False)
     position = at.position + at.orientation @ parameters[n + 6 :]
     return position @ vector_rotation(moved[3:]).T + moved[:3]
-
-
-def error_after_offsets(
-    nominal: RobotModel, q: np.ndarray, moved: np.ndarray, point: str, *, keep_frames: bool
-) -> np.ndarray:
-    """Remaining tool displacements `moved` (N, 3) at `q` (N, n) after the best offsets, to first order."""
-    none, free = np.zeros(nominal.n + 9), _free(nominal.n, frames=not keep_frames)
-    columns = _columns(nominal, q, none, point, free)
-    absorbed = columns @ _least_squares(columns, moved.ravel())
-    return moved - absorbed.reshape(moved.shape)
 
 
 def _free(n: int, *, frames: bool) -> np.ndarray:
@@ -137,7 +148,7 @@ def _solve(
         columns = _columns(nominal, q, parameters, point, free)
         missing = (targets - offset_tool(nominal, q, parameters, point)).ravel()
         rows, right = np.vstack([columns, rest]), np.concatenate([missing, -rest @ parameters])
-        step = _least_squares(rows, right)
+        step = least_squares(rows, right)
         turned = vector_rotation(step[nominal.n + 3 : nominal.n + 6]) @ vector_rotation(
             parameters[nominal.n + 3 : nominal.n + 6]
         )
@@ -166,7 +177,7 @@ def _columns(
     return (columns * free).reshape(-1, n + 9)
 
 
-def _least_squares(rows: np.ndarray, right: np.ndarray) -> np.ndarray:
+def least_squares(rows: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Minimum-norm solution, by QR of tall rows."""
     orthogonal, triangle = np.linalg.qr(rows)
     return np.linalg.lstsq(triangle, orthogonal.T @ right, rcond=None)[0]

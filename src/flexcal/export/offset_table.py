@@ -9,8 +9,8 @@ from io import StringIO
 import numpy as np
 
 from flexcal.export.chain import motors_to
-from flexcal.export.offset_fit import OffsetFit, error_after_offsets, fit_offsets, offset_tool
-from flexcal.export.representation_error import AT_REST, GEOMETRY, ToolMap
+from flexcal.export.offset_fit import OffsetFit, fit_offsets, offset_tool
+from flexcal.export.representation_error import AT_REST, GEOMETRY, DrawPoses, ToolMap
 from flexcal.export.transforms import XYZ_RPY, from_xyz_rpy, transform, xyz_rpy
 from flexcal.export.written_file import RenderedModel, rows_of
 from flexcal.model.parts import rotation_vector, vector_rotation
@@ -29,19 +29,22 @@ def render_offsets(
     point: str | None = None,
     keep_frames: bool = False,
     undetermined: Collection[int] = (),
+    draw: DrawPoses | None = None,
 ) -> RenderedModel:
     """The best joint offsets as a CSV table, with base and tool that go with them unless `keep_frames`; zero for the joints `undetermined`.
 
+    The poses are those of `draw`, as `poses_of` takes it.
     Raises `FlexcalError` for a robot without points, or an unknown point.
     """
     target, motors = motors_to(model, point, "Joint offsets")
-    fit = fit_offsets(model, nominal, target, keep_frames=keep_frames, undetermined=undetermined)
+    fit = fit_offsets(model, nominal, target, keep_frames=keep_frames, undetermined=undetermined, draw=draw)
     text = _csv(model, fit, motors, keep_frames=keep_frames)
-    placed = "as it is" if keep_frames else "with base and tool placed by best fit"
-    remarks = [
-        f"Without offsets, {placed}, the nominal robot is off by {fit.before.mean / MILLIMETRE:.3f} mm on average, "
-        f"{fit.before.max / MILLIMETRE:.3f} mm at most."
-    ]
+    remarks = []
+    if keep_frames:
+        remarks.append(
+            f"Without offsets, its base and point as they are, the nominal robot is off by {fit.before.mean / MILLIMETRE:.3f} mm on "
+            f"average, {fit.before.max / MILLIMETRE:.3f} mm at most."
+        )
     open_ = [model.motor_names[k] for k in motors if not fit.determined[k]]
     if open_:
         remarks.append(
@@ -107,7 +110,6 @@ def render_offsets(
             "tool": None if keep_frames else dict(zip("xyz", fit.tool.tolist(), strict=True)),
         },
         point=target,
-        absorb=lambda q, moved: error_after_offsets(nominal, q, moved, target, keep_frames=keep_frames),
     )
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +23,6 @@ HARDENING = "hardening of drives"
 GEOMETRY = "axis misalignments and lengths"
 AT_REST = (DEFLECTION, BACKLASH, GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
 """Terms beyond rigid geometry, which hardly any format can represent."""
-_CALIBRATED = (GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
-"""Terms that a calibration fits beside the geometry, which compensates for them if fitted alone."""
 
 SAMPLES = 2000
 _AGREED = 1e-9
@@ -38,6 +38,8 @@ _TURNS = 4 * np.pi
 
 ToolMap = Callable[[np.ndarray], np.ndarray]
 """Function from joint positions (N, n), rad or m, to positions (N, 3), m."""
+DrawPoses = Callable[[str | None, np.random.Generator], tuple[np.ndarray, str]]
+"""Random joint positions (N, n) for a point, by default the first, and the space within which they are."""
 
 
 @dataclass(frozen=True)
@@ -64,27 +66,30 @@ class PositionErrors:
 
 
 @dataclass(frozen=True)
-class UnrepresentedTerm:
-    """A term that a format cannot represent, and the tool error where it alone is left out (None: there is no tool)."""
-
-    name: str
-    error: PositionErrors | None
-
-
-@dataclass(frozen=True)
 class ExportErrors:
-    """Export errors: term by term, and the whole `error` between the robot at rest and the file as written, over poses `within` a space.
+    """The `terms` that a file lacks, and the `error` between the robot at rest and the file as written, over poses `within` a space.
 
-    `error` is None for a robot without points, which has no tool to be off; `payload` is what the robot carries, kg. A file without
-    `geometry` has no tool at all.
+    `error` is None for a robot without points, which has no tool to be off; `payload` is what the robot carries, kg. `nominal` is the error
+    of the nominal robot over the same poses, its base and point fitted, where it is known. A file without `geometry` has no tool at all.
     """
 
-    terms: tuple[UnrepresentedTerm, ...]
+    terms: tuple[str, ...]
     error: PositionErrors | None
     poses: int
     within: str
     payload: float
+    nominal: PositionErrors | None = None
     geometry: bool = True
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """Entries of JSON documents."""
+        error, nominal = self.error, self.nominal
+        return {
+            "lost": [{"term": term} for term in self.terms],
+            "tool_error": error and error.in_millimetres() | {"poses": self.poses, "within": self.within},
+            "nominal_error": nominal and nominal.in_millimetres(),
+        }
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -93,6 +98,13 @@ class ExportErrors:
             return (
                 "The file has actuators only: links and joints are those of the robot that is loaded beside it.",
             )
+        beside = ""
+        if self.nominal is not None and self.nominal.max / MILLIMETRE > _SAME:
+            off = self.nominal.in_millimetres()
+            beside = (
+                f"; the nominal robot, its base and point fitted, is off by {off['mean_mm']:.3f} mm on average, "
+                f"{off['max_mm']:.3f} mm at most"
+            )
         if not self.terms:
             if self.error is None:
                 return ("Nothing is lost.",)
@@ -100,55 +112,24 @@ class ExportErrors:
                 return (
                     f"Nothing is lost, but where gravity hardly presses a drive to one side of its gap: there the tool is off by "
                     f"{self.error.max / MILLIMETRE:.3f} mm at most, and by {max(self.error.p95 / MILLIMETRE, _AGREED):.0e} mm in 95 % of "
-                    f"{self.poses} random poses of the {self.within}.",
+                    f"{self.poses} random poses of the {self.within}{beside}.",
                 )
             return (
                 f"Nothing is lost: the file agrees with the calibrated robot to {max(self.error.max / MILLIMETRE, _AGREED):.0e} mm "
-                f"over {self.poses} random poses of the {self.within}.",
+                f"over {self.poses} random poses of the {self.within}{beside}.",
             )
-        named = ", ".join(f"{term.name}{_alone(term.error)}" for term in self.terms)
+        named = ", ".join(self.terms)
         if self.error is None:
             return (
                 f"This format cannot carry {named}. What that costs is not known: robot.yaml declares no point.",
             )
         off = self.error.in_millimetres()
         carrying = f", carrying {self.payload:.3g} kg" if self.payload > 0 else ""
-        alone = any(term.name in _CALIBRATED for term in self.terms)
-        instead = ("A calibration with --terms kinematic makes up for a part of that by the geometry.",)
         return (
             f"This format cannot carry {named}.",
-            *(instead if alone else ()),
             f"The tool is off by {off['mean_mm']:.3f} mm on average, {off['p95_mm']:.3f} mm in 95 % of poses and "
-            f"{off['max_mm']:.3f} mm at most, over {self.poses} random poses of the {self.within}{carrying}.",
+            f"{off['max_mm']:.3f} mm at most, over {self.poses} random poses of the {self.within}{carrying}{beside}.",
         )
-
-
-def measure_export_error(
-    model: RobotModel,
-    tool: ToolMap,
-    terms: Sequence[str],
-    *,
-    point: str | None = None,
-    absorb: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
-) -> ExportErrors:
-    """Error of a file that puts the target at `tool` and lacks `terms`; only those that `model` has count.
-
-    The robot carries its declared payload. `absorb` takes joint positions (N, n) and what a term moves the tool by (N, 3), and returns
-    what the file's own freedom leaves of it; by default all of it.
-    """
-    present = [term for term in terms if _leave_out(model, term) is not model]
-    payload = model.payload_mass
-    if not model.points:
-        return ExportErrors(
-            tuple(UnrepresentedTerm(term, None) for term in present), None, 0, "joint range", payload
-        )
-    q, within = random_poses(model, point, np.random.default_rng(0))
-    full, flank = tool_positions(model, q, point=point)
-    lost = []
-    for term in present:
-        moved = full - tool_positions(_leave_out(model, term), q, point=point, flank=flank)[0]
-        lost.append(UnrepresentedTerm(term, PositionErrors.of(moved if absorb is None else absorb(q, moved))))
-    return ExportErrors(tuple(lost), PositionErrors.of(full - tool(q)), len(q), within, payload)
 
 
 def tool_positions(
@@ -159,16 +140,24 @@ def tool_positions(
     return point_kinematics(model, q, rest.deflection, point=point, jacobians=False).position, rest.flank
 
 
-def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator) -> tuple[np.ndarray, str]:
-    """Random joint positions (N, n) with the target in the declared working volume, or over the whole joint range without one.
-
-    The second value says which. Where fewer than 50 of the tries reach the volume, it is the joint range, too.
-    """
+def drawing_limits(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper end (n,) between which poses are drawn, rad or m: of joints without limits one turn, or ± 1 m."""
     lower, upper = joint_limits(model)
     slides = np.array([joint.kind == "prismatic" for joint in model.motor_joints])
     free = ~(upper - lower <= np.where(slides, np.finfo(float).max, _TURNS))
     reach = np.where(slides, _STROKE, np.pi)
-    lower, upper = np.where(free, -reach, lower), np.where(free, reach, upper)
+    return np.where(free, -reach, lower), np.where(free, reach, upper)
+
+
+def random_poses(
+    model: RobotModel, point: str | None, rng: np.random.Generator, ranges: np.ndarray | None = None
+) -> tuple[np.ndarray, str]:
+    """Random joint positions (N, n) with the target in the declared working volume, or over the whole joint range without one.
+
+    The second value says which. Where fewer than 50 of the tries reach the volume, it is the joint range, too. `ranges` (2, n) take the
+    place of the `drawing_limits`.
+    """
+    lower, upper = drawing_limits(model) if ranges is None else ranges
     box = model.config.working_volume
     if box is not None:
         targets = rng.uniform(box.lower, box.upper, (SAMPLES // _TRIES, 3))
@@ -180,7 +169,12 @@ def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator)
     return random_configurations(model, SAMPLES, rng, lower, upper), "joint range"
 
 
-def _leave_out(model: RobotModel, term: str) -> RobotModel:
+def poses_of(model: RobotModel, draw: DrawPoses | None) -> DrawPoses:
+    """`draw`, by default `random_poses` of `model`."""
+    return partial(random_poses, model) if draw is None else draw
+
+
+def leave_out(model: RobotModel, term: str) -> RobotModel:
     """Robot without a term; unchanged if it does not have it."""
     geometry, springs, drives = model.geometry, model.springs, model.drives
     if term == GEOMETRY:
@@ -217,10 +211,3 @@ def _leave_out(model: RobotModel, term: str) -> RobotModel:
     else:
         return model
     return replace(model, geometry=geometry, springs=springs, drives=drives)
-
-
-def _alone(error: PositionErrors | None) -> str:
-    if error is None:
-        return ""
-    errors = error.in_millimetres()
-    return f" (alone {errors['mean_mm']:.3f} mm on average, {errors['max_mm']:.3f} mm at most)"

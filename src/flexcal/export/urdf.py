@@ -10,6 +10,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.export.following_joints import followed_joints, joint_values, mimicked, relation_remarks
+from flexcal.export.geometry_fit import render_representable
 from flexcal.export.representation_error import AT_REST, ToolMap
 from flexcal.export.urdf_inertials import bodiless_remark, write_inertials
 from flexcal.export.written_file import ExportedFile, RenderedModel, write_rendered
@@ -22,6 +23,8 @@ from flexcal.model.urdf import LARGEST_URDF
 
 def export_urdf(model: RobotModel, path: str | Path) -> ExportedFile:
     """Write the URDF of a robot and measure the error due to the terms that the format lacks; see `render_urdf`.
+
+    Where it lacks some, the geometry is that with which the points come nearest to those of the robot at rest.
 
     Parameters
     ----------
@@ -49,7 +52,7 @@ def export_urdf(model: RobotModel, path: str | Path) -> ExportedFile:
     ...     export_urdf(model, f"{folder}/ur5.urdf").lost
     ()
     """
-    return write_rendered(model, path, render_urdf(model))
+    return write_rendered(model, path, render_representable(model, render_urdf))
 
 
 def render_urdf(model: RobotModel) -> RenderedModel:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import dropwhile
 from pathlib import Path
@@ -12,7 +12,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.export.representation_error import ExportErrors, ToolMap, measure_export_error
+from flexcal.export.offset_fit import nominal_error
+from flexcal.export.representation_error import (
+    DrawPoses,
+    ExportErrors,
+    PositionErrors,
+    ToolMap,
+    leave_out,
+    poses_of,
+    tool_positions,
+)
 from flexcal.files.transaction import write_text
 from flexcal.model.robot import RobotModel
 from flexcal.printable import one_line
@@ -22,9 +31,8 @@ from flexcal.printable import one_line
 class RenderedModel:
     """Rendered robot: `text`, and `tool`, the target's position when that text is read back.
 
-    `tool` is None for a file without geometry. `unrepresented` are the terms that the format has no place for; `absorb` as
-    `measure_export_error` takes it; `about` says in sentences what stands in the file, for its header; `remarks` what a reader of it must
-    know besides; `table` is what to show of it.
+    `tool` is None for a file without geometry. `unrepresented` are the terms that the format has no place for; `about` says in
+    sentences what stands in the file, for its header; `remarks` what a reader of it must know besides; `table` is what to show of it.
     """
 
     text: str
@@ -35,7 +43,6 @@ class RenderedModel:
     remarks: tuple[str, ...] = ()
     table: dict[str, Any] = field(default_factory=dict)
     point: str | None = None
-    absorb: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,18 +60,49 @@ class ExportedFile:
     @property
     def lost(self) -> tuple[str, ...]:
         """Names of the terms that the file does not represent."""
-        return tuple(term.name for term in self.loss.terms)
+        return self.loss.terms
 
 
-def write_rendered(model: RobotModel, path: str | Path, rendered: RenderedModel) -> ExportedFile:
+def measure_export_error(
+    model: RobotModel,
+    tool: ToolMap,
+    terms: Sequence[str],
+    *,
+    point: str | None = None,
+    nominal: RobotModel | None = None,
+    draw: DrawPoses | None = None,
+) -> ExportErrors:
+    """Error of a file that puts the target at `tool` and lacks `terms`; only those that `model` has count.
+
+    The robot carries its declared payload. The poses are those of `draw`, as `poses_of` takes it; over them the error of the `nominal`
+    robot is measured too, its base and point fitted.
+    """
+    present = tuple(term for term in terms if leave_out(model, term) is not model)
+    payload = model.payload_mass
+    if not model.points:
+        return ExportErrors(present, None, 0, "joint range", payload)
+    q, within = poses_of(model, draw)(point, np.random.default_rng(0))
+    full, _ = tool_positions(model, q, point=point)
+    beside = None if nominal is None else nominal_error(nominal, q, full, model.point(point).name)
+    return ExportErrors(present, PositionErrors.of(full - tool(q)), len(q), within, payload, beside)
+
+
+def write_rendered(
+    model: RobotModel,
+    path: str | Path,
+    rendered: RenderedModel,
+    *,
+    nominal: RobotModel | None = None,
+    draw: DrawPoses | None = None,
+) -> ExportedFile:
     """Measure the representation error of `rendered` against `model`, and write it with that in its header; raises `InputError` if not
-    possible.
+    possible. `nominal` and `draw` are as `measure_export_error` takes them.
     """
     if rendered.tool is None:
         loss = ExportErrors((), None, 0, "joint range", model.payload_mass, geometry=False)
     else:
         loss = measure_export_error(
-            model, rendered.tool, rendered.unrepresented, point=rendered.point, absorb=rendered.absorb
+            model, rendered.tool, rendered.unrepresented, point=rendered.point, nominal=nominal, draw=draw
         )
     lines = [f"{model.name}, written by flexcal.", *rendered.about, *loss.sentences, *rendered.remarks]
     write_text(path, _with_header(rendered.text, lines, rendered.comments))

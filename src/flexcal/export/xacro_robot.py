@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError, InputError
 from flexcal.export.following_joints import mimicked, relation_remarks
-from flexcal.export.representation_error import AT_REST, ExportErrors, ToolMap, measure_export_error
+from flexcal.export.representation_error import ToolMap
 from flexcal.export.urdf import link_placements
 from flexcal.export.urdf_inertials import bodiless_links, bodiless_remark
 from flexcal.export.wanted_numbers import Wanted
@@ -31,19 +31,19 @@ _NONE = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class XacroExport:
-    """Content of the files, by their paths, what each of the changed ones got, and the error of the expanded robot.
+    """Content of the files, by their paths, what each of the changed ones got, and where the `tool` of the expanded robot is.
 
     `points` has position, m, and roll, pitch, yaw, rad, of the points of robot.yaml in their links; no file has them.
     """
 
     description: PatchedDescription
-    loss: ExportErrors
+    tool: ToolMap
     remarks: tuple[str, ...]
     points: Mapping[str, tuple[str, tuple[float, ...], tuple[float, ...]]]
 
 
 def render_xacro(model: RobotModel, nominal: RobotModel, source: XacroSource, zeros: Zeros) -> XacroExport:
-    """The files of `source` with the placements of joints and the inertials of `model`.
+    """The files of `source` with the placements of joints and the inertials of `model`, whose geometry is that to write.
 
     With the `zeros` in ros2_control the offsets of the joints stand there and nowhere else, and limits move with them. Raises
     `InputError` as `XacroSource.expand` does, and where the files describe another robot than the URDF of `nominal`; `FlexcalError` where
@@ -62,7 +62,6 @@ def render_xacro(model: RobotModel, nominal: RobotModel, source: XacroSource, ze
         wanted += wanted_zeros(source.path, expansion, joints, model)
     inertials, kept = wanted_inertials(model, expansion)
     description = patched_description(source, expansion, [*wanted, *inertials])
-    loss = measure_export_error(model, _tool_map(source, model, description.expansion.text, zeros), AT_REST)
     left = bodiless_links(model, read_urdf(model.urdf, model.config.locked).inertias)
     remarks = [*bodiless_remark(left), *relation_remarks(model, "URDF")]
     if kept:
@@ -70,7 +69,8 @@ def render_xacro(model: RobotModel, nominal: RobotModel, source: XacroSource, ze
             f"The inertials of {', '.join(kept)} stay as they were: they are not written in the link itself, or what hangs on it weighs "
             "more than was identified; 'export urdf' has them."
         )
-    return XacroExport(description, loss, tuple(remarks), _points(model))
+    tool = _tool_map(source, model, description.expansion.text, zeros)
+    return XacroExport(description, tool, tuple(remarks), _points(model))
 
 
 def _joints(expansion: Expansion) -> dict[str, ExpandedElement]:

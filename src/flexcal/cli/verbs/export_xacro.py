@@ -82,7 +82,7 @@ class ExportXacro:
         console.say(
             f"wrote {len(document['files'])} files to {self.out}, {len(exported.changes)} of them changed"
         )
-        for sentence in (*exported.export.loss.sentences, *exported.remarks):
+        for sentence in (*exported.loss.sentences, *exported.remarks):
             console.say(sentence)
         for name, point in document["points"].items():
             xyz, rpy = (" ".join(f"{value:.6f}" for value in point[key]) for key in ("xyz", "rpy"))

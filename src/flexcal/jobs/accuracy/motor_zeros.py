@@ -24,7 +24,7 @@ from flexcal.export import (
 )
 from flexcal.files.transaction import write_text
 from flexcal.jobs.calibration import fitted_files, fitted_points
-from flexcal.jobs.deployment import identified_robot, undetermined_zeros
+from flexcal.jobs.deployment import identified_robot, poses_where_it_holds, undetermined_zeros
 from flexcal.jobs.inputs import CalibratedRobot
 from flexcal.jobs.pages import Result
 from flexcal.model.robot import RobotModel
@@ -221,7 +221,8 @@ def export_motor_zeros(
     own = joint_motors(calibration, read_motor_calibrations(calibration), robot.nominal.joint_names, motors)
     seen = _unseen(robot, tuple(verification))
     model = robot.probable
-    rendered = render_offsets(model, robot.nominal, undetermined=undetermined_zeros(robot))
+    draw = poses_where_it_holds(robot, model, near=False)
+    rendered = render_offsets(model, robot.nominal, undetermined=undetermined_zeros(robot), draw=draw)
     table, names = rendered.table["joints"], robot.nominal.joint_names
     determined = tuple(name in table and table[name]["determined"] for name in names)
     new = [
@@ -232,7 +233,7 @@ def export_motor_zeros(
     corrected = robot.nominal.with_values({f"{n}.offset": v for n, v in zip(names, offsets, strict=True)})
     changed = [motor for motor, old in zip(new, own, strict=True) if motor != old.motor]
     assert rendered.tool is not None
-    left = measure_export_error(model, rendered.tool, (), point=rendered.point).error
+    left = measure_export_error(model, rendered.tool, (), point=rendered.point, draw=draw).error
     assert left is not None
     modelled = (rendered.table["without_offsets"]["mean_mm"] * MILLIMETRE, left.mean)
     verdict = None if seen is None else _verdict((robot.nominal, corrected, model), seen)

@@ -1,5 +1,12 @@
 from .compensation import Compensation, compensate, compensate_robot
-from .export import ExportedRobot, export_robot, export_stored_robot, identified_robot, undetermined_zeros
+from .export import (
+    ExportedRobot,
+    export_robot,
+    export_stored_robot,
+    identified_robot,
+    poses_where_it_holds,
+    undetermined_zeros,
+)
 from .filtered_program import FilteredProgram
 from .prediction import Prediction, predict, predict_robot
 from .program_files import read_program, written_files
@@ -21,6 +28,7 @@ __all__ = [
     "filter_program",
     "filter_program_file",
     "identified_robot",
+    "poses_where_it_holds",
     "predict",
     "predict_robot",
     "read_program",

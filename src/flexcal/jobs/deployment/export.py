@@ -12,14 +12,18 @@ from flexcal.dynamics.torque_model import TorqueModel
 from flexcal.errors import FlexcalError, InputError
 from flexcal.export import (
     FORMATS,
+    SAMPLES,
     Convention,
+    DrawPoses,
     ExportedFile,
     RenderedModel,
+    drawing_limits,
     random_poses,
     render,
     render_dh,
     render_mjcf,
     render_offsets,
+    render_representable,
     render_runtime,
     undetermined_offsets,
     write_rendered,
@@ -40,6 +44,10 @@ from flexcal.model.robot import RobotModel, with_blocks
 _CONVENTIONS: dict[str, Convention] = {"dh": "standard", "mdh": "modified"}
 _NOMINAL_TORQUES = "No dynamics were identified: the torques of the runtime are those of the URDF's links and robot.yaml's friction."
 _HEADERS = (".h", ".hpp")
+_ENOUGH = 200
+"""Poses to which a robot can be fitted."""
+_WHOLE = 0.8
+"""Share of a joint's range from which the poses of a calibration have the whole of it."""
 _OPTIONS = {
     "point": ("dh", "mdh", "offsets"),
     "four_parameters": ("dh", "mdh"),
@@ -80,17 +88,10 @@ class ExportedRobot(Result):
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
-        loss = self.export.loss
         return {
             "file": self.export.path,
             "calibrated": self.calibrated,
-            "lost": [
-                {"term": term.name} | (term.error.in_millimetres() if term.error else {})
-                for term in loss.terms
-            ],
-            "tool_error": loss.error.in_millimetres() | {"poses": loss.poses, "within": loss.within}
-            if loss.error
-            else None,
+            **self.export.loss.document,
             "remarks": list(self.export.remarks),
             **self.export.table,
         }
@@ -108,6 +109,9 @@ def export_robot(
     temperature: float | None = None,
 ) -> ExportedRobot:
     """Write a calibrated robot in a file format of other programs, and measure the error due to the terms that the format lacks.
+
+    The robot in the file is the one of that format that is nearest to the calibrated one at rest, over random poses of the working volume,
+    or of the joint range, at which the calibration holds: its geometry makes up for the terms as far as it can.
 
     Parameters
     ----------
@@ -169,19 +173,16 @@ def export_robot(
         )
     probable, warm = held_at(robot, temperature)
     nominal = robot.nominal
+    draw = poses_where_it_holds(robot, probable, near=format != "offsets")
     rendered: RenderedModel
-    if format in _CONVENTIONS:
-        rendered = render_dh(
+    if format == "offsets":
+        rendered = render_offsets(
             probable,
             nominal,
-            _CONVENTIONS[format],
             point=point,
-            four_parameters=four_parameters,
-            unseen=robot.unseen if robot.targets else None,
-        )
-    elif format == "offsets":
-        rendered = render_offsets(
-            probable, nominal, point=point, keep_frames=keep_frames, undetermined=undetermined_zeros(robot)
+            keep_frames=keep_frames,
+            undetermined=undetermined_zeros(robot),
+            draw=draw,
         )
     elif format == "runtime":
         drives = TorqueModel.of_blocks(probable, robot.blocks)
@@ -189,13 +190,26 @@ def export_robot(
             probable, robot.with_points, drives.document(), header=Path(path).suffix in _HEADERS
         )
         rendered = replace(rendered, remarks=() if drives.identified else (_NOMINAL_TORQUES,))
-    elif format == "mjcf":
-        rendered = render_mjcf(probable, identified_actuators(robot))
     elif format == "isaac":
         rendered = rendered_actuators(robot, time_step)
     else:
-        rendered = render(format, probable, nominal)
-    written = write_rendered(probable, path, rendered)
+
+        def rendering(model: RobotModel) -> RenderedModel:
+            if format in _CONVENTIONS:
+                return render_dh(
+                    model,
+                    nominal,
+                    _CONVENTIONS[format],
+                    point=point,
+                    four_parameters=four_parameters,
+                    unseen=robot.unseen if robot.targets else None,
+                )
+            if format == "mjcf":
+                return render_mjcf(model, identified_actuators(robot))
+            return render(format, model, nominal)
+
+        rendered = render_representable(probable, rendering, draw)
+    written = write_rendered(probable, path, rendered, nominal=nominal, draw=draw)
     remarks = (
         *use_remarks(robot),
         *_extent_remark(robot, rendered),
@@ -278,6 +292,46 @@ def _extent_remark(robot: CalibratedRobot, rendered: RenderedModel) -> tuple[str
     q, within = random_poses(robot.probable, rendered.point, np.random.default_rng(0))
     targets = np.full(len(q), robot.probable.point(rendered.point).name)
     return beyond_remark(robot, beyond_calibration(robot, q, targets), f"random poses of the {within}")
+
+
+def poses_where_it_holds(robot: CalibratedRobot, model: RobotModel, *, near: bool = True) -> DrawPoses:
+    """Random poses of `model`, the calibrated `robot` or that at another temperature, at which the calibration holds.
+
+    They are those of the working volume or, without one, of the joint range. Where the poses of the calibration are of a part of the
+    joints' ranges, half of them are within these if `near`; and all where it hardly holds elsewhere.
+    """
+    ranges = _partial_ranges(robot, model)
+
+    def draw(point: str | None, rng: np.random.Generator) -> tuple[np.ndarray, str]:
+        q, within = random_poses(model, point, rng)
+        targets = np.full(len(q), model.point(point).name)
+        far = q[beyond_calibration(robot, q, targets) == 0]
+        where = within if len(far) == len(q) else f"{within} where the calibration holds"
+        if ranges is None:
+            return (far, where) if len(far) >= _ENOUGH else (q, within)
+        if len(far) >= _ENOUGH and not near:
+            return far, where
+        inside, there = random_poses(model, point, rng, ranges)
+        if len(far) < _ENOUGH:
+            return inside, f"{there} within the joint ranges of the calibration"
+        if there != within:
+            return far, where
+        count = min(len(far), len(inside), SAMPLES // 2)
+        both = np.concatenate([far[:count], inside[:count]])
+        return both, f"{where}, half of them within the joint ranges of the calibration"
+
+    return draw
+
+
+def _partial_ranges(robot: CalibratedRobot, model: RobotModel) -> np.ndarray | None:
+    """Lower and upper ends (2, n) of the joints at the poses of the calibration; None if unknown, or most of what the joints can."""
+    known = robot.blocks["calibration"].ranges if "calibration" in robot.blocks else {}
+    if not all(name in known for name in model.motor_names):
+        return None
+    ranges = np.array([known[name] for name in model.motor_names]).T
+    lower, upper = drawing_limits(model)
+    whole = (ranges[1] - ranges[0] > _WHOLE * (upper - lower)).all()
+    return None if whole else np.clip(ranges, lower, upper)
 
 
 def undetermined_zeros(robot: CalibratedRobot) -> tuple[int, ...]:

@@ -9,9 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.errors import InputError, unreadable
-from flexcal.export import XacroExport, XacroSource, Zeros, render_xacro, shifted_limits
+from flexcal.export import (
+    AT_REST,
+    ExportErrors,
+    XacroExport,
+    XacroSource,
+    Zeros,
+    measure_export_error,
+    render_xacro,
+    representable_robot,
+    shifted_limits,
+)
 from flexcal.files.transaction import MEGABYTE, atomic_path, read_bytes
-from flexcal.jobs.deployment.export import identified_robot
+from flexcal.jobs.deployment.export import identified_robot, poses_where_it_holds
 from flexcal.jobs.inputs import held_at, use_remarks
 from flexcal.jobs.pages import Result
 
@@ -24,6 +34,7 @@ class ExportedXacro(Result):
     """
 
     export: XacroExport
+    loss: ExportErrors
     files: Mapping[Path, bytes]
     main: Path
     changes: Mapping[Path, tuple[str, ...]]
@@ -38,22 +49,15 @@ class ExportedXacro(Result):
     def summary(self) -> str:
         """What each file got, the loss in millimetres, and remarks."""
         lines = [f"{path}: {'; '.join(said)}" for path, said in self.changes.items()]
-        return "\n".join([self.headline, *lines, *self.export.loss.sentences, *self.remarks])
+        return "\n".join([self.headline, *lines, *self.loss.sentences, *self.remarks])
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
-        loss = self.export.loss
         return {
             "main": self.main,
             "files": [{"file": path, "changes": list(self.changes.get(path, ()))} for path in self.files],
             "calibrated": self.calibrated,
-            "lost": [
-                {"term": term.name} | (term.error.in_millimetres() if term.error else {})
-                for term in loss.terms
-            ],
-            "tool_error": loss.error.in_millimetres() | {"poses": loss.poses, "within": loss.within}
-            if loss.error
-            else None,
+            **self.loss.document,
             "points": {
                 name: {"link": link, "xyz": list(xyz), "rpy": list(rpy)}
                 for name, (link, xyz, rpy) in self.export.points.items()
@@ -115,11 +119,14 @@ def export_xacro(
     robot = identified_robot(robot_file, estimates)
     model, warm = held_at(robot, temperature)
     source = XacroSource(xacro or robot.nominal.urdf, arguments or {}, packages or {})
-    export = render_xacro(model, robot.nominal, source, zeros)
+    draw = poses_where_it_holds(robot, model)
+    written, said = representable_robot(model, AT_REST, draw)
+    export = render_xacro(written, robot.nominal, source, zeros)
+    loss = measure_export_error(model, export.tool, AT_REST, nominal=robot.nominal, draw=draw)
     folder, files, changes, main = _below_one_folder(export)
-    remarks = [*export.remarks, *use_remarks(robot), *warm]
+    remarks = [*said, *export.remarks, *use_remarks(robot), *warm]
     if joint_limits is not None:
-        offsets = dict(zip(model.joint_names, model.joint_offsets.tolist(), strict=True))
+        offsets = dict(zip(written.joint_names, written.joint_offsets.tolist(), strict=True))
         try:
             content = read_bytes(joint_limits, limit=MEGABYTE)
         except OSError as problem:
@@ -137,7 +144,9 @@ def export_xacro(
     for path, content in files.items():
         with atomic_path(out / path) as temporary:
             temporary.write_bytes(content)
-    return ExportedXacro(model, export, files, main, changes, tuple(remarks), "calibration" in robot.blocks)
+    return ExportedXacro(
+        model, export, loss, files, main, changes, tuple(remarks), "calibration" in robot.blocks
+    )
 
 
 def _require_own_place(out: Path, path: Path) -> None:
