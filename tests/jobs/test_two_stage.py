@@ -171,9 +171,10 @@ def test_the_table_says_what_the_results_say(demo: Path) -> None:
 
 
 def test_the_stored_estimates_reproduce_the_calibrated_robot(demo: Path, tx90l: RobotModel) -> None:
+    from flexcal.export import AT_REST, representable_robot
     from flexcal.model.robot.stored_estimates import apply_estimates
 
-    stored = apply_estimates(tx90l, demo / "estimates.yaml")
+    stored, _ = representable_robot(apply_estimates(tx90l, demo / "estimates.yaml"), AT_REST)
     urdf = (demo / "calibrated.urdf").read_text()
     assert 'link name="smr"' in urdf
     import pinocchio as pin

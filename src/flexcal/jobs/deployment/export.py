@@ -297,28 +297,23 @@ def _extent_remark(robot: CalibratedRobot, rendered: RenderedModel) -> tuple[str
 def poses_where_it_holds(robot: CalibratedRobot, model: RobotModel, *, near: bool = True) -> DrawPoses:
     """Random poses of `model`, the calibrated `robot` or that at another temperature, at which the calibration holds.
 
-    They are those of the working volume or, without one, of the joint range. Where the poses of the calibration are of a part of the
-    joints' ranges, half of them are within these if `near`; and all where it hardly holds elsewhere.
+    They are those of the working volume or, without one, of the joint range; all, where it holds at hardly any. Where the poses of the
+    calibration are of a part of the joints' ranges, as many more are within these if `near`.
     """
-    ranges = _partial_ranges(robot, model)
+    ranges = _partial_ranges(robot, model) if near else None
 
     def draw(point: str | None, rng: np.random.Generator) -> tuple[np.ndarray, str]:
         q, within = random_poses(model, point, rng)
         targets = np.full(len(q), model.point(point).name)
         far = q[beyond_calibration(robot, q, targets) == 0]
         where = within if len(far) == len(q) else f"{within} where the calibration holds"
-        if ranges is None:
-            return (far, where) if len(far) >= _ENOUGH else (q, within)
-        if len(far) >= _ENOUGH and not near:
-            return far, where
-        inside, there = random_poses(model, point, rng, ranges)
-        if len(far) < _ENOUGH:
-            return inside, f"{there} within the joint ranges of the calibration"
-        if there != within:
-            return far, where
-        count = min(len(far), len(inside), SAMPLES // 2)
-        both = np.concatenate([far[:count], inside[:count]])
-        return both, f"{where}, half of them within the joint ranges of the calibration"
+        if ranges is not None:
+            inside, there = random_poses(model, point, rng, ranges)
+            if there == within:
+                far, inside = far[: SAMPLES // 2], inside[: SAMPLES // 2]
+                where += f", {len(inside)} of them within the joint ranges of the calibration"
+                return np.concatenate([far, inside]), where
+        return (far, where) if len(far) >= _ENOUGH else (q, within)
 
     return draw
 
