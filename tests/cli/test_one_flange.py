@@ -87,8 +87,8 @@ def said_by_others(run, arm: YieldingArm, robot: Path) -> dict[str, np.ndarray]:
     """The same in other verbs: where the tip is by the calibrated geometry and by the exported URDF, what a filtered program commands, and
     where a work object lies, m.
 
-    The exported geometry makes up for gravity compliance at poses where the calibration holds, and with another place of the reflector these
-    are a few others: it counts a fifth.
+    The exported geometry makes up for gravity compliance at poses where the calibration holds, and with another place of the reflector
+    these are a few others: it counts a fifth.
     """
     q, tip = arm.postures(10, np.random.default_rng(9), 0.6), np.array(arm.tip)
     outcome = run("export", "urdf", robot, "--out", robot.with_name("exported.urdf"))
