@@ -23,7 +23,8 @@ import numpy as np
 
 from benchmarks._tasks import in_parallel
 from flexcal import PoseRequest, RobotModel, calibrate, design_poses, read_poses
-from flexcal.calibration.verification import PredictionErrors, prediction_errors, uncalibrated_model
+from flexcal.calibration.measurement import predict_measurements, with_stations_at_base
+from flexcal.calibration.verification import PredictionErrors, best_placement, prediction_errors
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from tests.jobs.yielding_robot import (
@@ -105,9 +106,10 @@ def poses_in(region: str, robot: YieldingRobot, count: int) -> np.ndarray:
 
 def uncalibrated_p90(model: RobotModel, poses: PoseSet, fresh: PoseSet) -> float:
     """P90, m, of the nominal robot with base and point found from the poses."""
-    registered = uncalibrated_model(model, poses).registered
-    assert registered is not None
-    return prediction_errors(registered, fresh).all.p90
+    at_base = with_stations_at_base(model.with_stations(poses.places))
+    tool = predict_measurements(at_base, poses, elastic=False).kinematics
+    placement = best_placement(poses, tool.position, tool.orientation)
+    return prediction_errors(at_base.with_values(placement.values(at_base)), fresh).all.p90
 
 
 def observed_over_predicted(errors: PredictionErrors) -> float:

@@ -75,6 +75,15 @@ class Tried:
             told.append("false no")
         return told + (["wide"] if self.wide else [])
 
+    def told(self, *, whole: bool) -> str:
+        """One line, with the reasons of the verdicts where asked for or where a no is false."""
+        line = (
+            f"arm {self.arm} ({self.axes} axes), {self.poses} poses, {self.noise_um:g} µm: {self.before:.3f} -> {self.after:.3f} mm, "
+            f"observed over predicted {self.ratio:.2f}, {self.trust}/{self.verified}, {self.seconds:.1f} s"
+            f"{' !! ' if self.faults else ''}{', '.join(self.faults)} {self.refused} {'; '.join(self.wide)}"
+        )
+        return "\n    ".join([line, *(self.reasons if whole or "false no" in self.faults else ())])
+
 
 def drawn_arm(number: int) -> tuple[Body, ...]:
     """Three known arms, then arms of three to seven axes with random lengths, whose axes cross or follow each other at right angles."""
@@ -154,22 +163,15 @@ def main() -> None:
     parser.add_argument("--poses", type=int, nargs="+", default=POSES)
     parser.add_argument("--noise-um", type=float, nargs="+", default=NOISES_UM)
     parser.add_argument("--processes", type=int, default=os.cpu_count())
-    parser.add_argument("--each", action="store_true", help="print every calibration")
+    parser.add_argument("--each", action="store_true", help="print the reasons of every verdict")
     given = parser.parse_args()
     arms = range(given.first, given.first + given.arms)
     tasks = [(arm, count, noise) for count in given.poses for noise in given.noise_um for arm in arms]
     cells: dict[tuple[int, float], list[Tried]] = defaultdict(list)
-    for tried in in_parallel(one, tasks, processes=given.processes):
+    for tried in in_parallel(
+        one, tasks, processes=given.processes, show=lambda tried: tried.told(whole=given.each)
+    ):
         cells[tried.poses, tried.noise_um].append(tried)
-        if given.each or tried.faults:
-            print(
-                f"arm {tried.arm} ({tried.axes} axes), {tried.poses} poses, {tried.noise_um:g} µm: {tried.before:.3f} -> "
-                f"{tried.after:.3f} mm, observed over predicted {tried.ratio:.2f}, {tried.trust}/{tried.verified}, {tried.seconds:.1f} s"
-                f"{' !! ' if tried.faults else ''}{', '.join(tried.faults)} {tried.refused} {'; '.join(tried.wide)}",
-                flush=True,
-            )
-            if given.each or "false no" in tried.faults:
-                print("    " + "\n    ".join(tried.reasons), flush=True)
     print(f"P90 before -> after, mm, median of {given.arms} arms")
     for (count, noise), own in cells.items():
         done = [t for t in own if not t.refused]

@@ -10,7 +10,13 @@ from refusals import refused
 from yielding_robot import PANDA_LIKE, TX90L_LIKE, UR_LIKE, Body, YieldingRobot, write_robot
 
 from flexcal import RobotModel, ToolTargets, calibrate, compensate, read_poses
-from flexcal.calibration.verification import PredictionErrors, prediction_errors, uncalibrated_model
+from flexcal.calibration.measurement import predict_measurements, with_stations_at_base
+from flexcal.calibration.verification import (
+    PredictionErrors,
+    best_placement,
+    prediction_errors,
+    uncalibrated_model,
+)
 from flexcal.data.poses import PoseSet
 from flexcal.jobs.calibration import Calibration
 
@@ -74,6 +80,27 @@ def test_fourteen_poses_make_a_robot_accurate(arm: str, tmp_path: Path) -> None:
     assert np.median(reached) < 0.25e-3
     # 1.4 and 1.0 and .7 measured; of three robots' few degrees of freedom
     assert 0.4 < np.sqrt(observed / predicted) < 2.5
+
+
+@pytest.mark.parametrize("noise", [1e-3, 3e-3], ids=["1mm", "3mm"])
+def test_few_noisy_poses_do_no_harm(noise: float, tmp_path: Path) -> None:
+    """Six and eight poses of motion capture: noise is no error of the joints, of 13 mrad and 2.9 mm, by which P90 was once 24 mm for 4."""
+    ratios = []
+    for number, bodies in enumerate(ARMS.values()):
+        for count in (6, 8):
+            folder = tmp_path / f"{number}_{count}"
+            folder.mkdir()
+            robot = robot_of(bodies, 40 + number)
+            robot.noise = noise
+            model, own, fresh, _ = read(folder, robot, count)
+            at_base = with_stations_at_base(model.with_stations(own.places))
+            tool = predict_measurements(at_base, own, elastic=False).kinematics
+            placed = best_placement(own, tool.position, tool.orientation)
+            before = prediction_errors(at_base.with_values(placed.values(at_base)), fresh).all.p90
+            ratios.append(calibrated(model, own, fresh)[1].all.p90 / before)
+    # 1.16 and 1.20 measured: joint zeros of 2 mrad, as robots have them, are more than these arms have
+    assert np.exp(np.mean(np.log(ratios))) < 1.4
+    assert max(ratios) < 3.0
 
 
 def test_eight_poses_are_not_refused_and_better_than_none(tmp_path: Path) -> None:

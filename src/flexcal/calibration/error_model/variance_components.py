@@ -40,9 +40,10 @@ _ALONE = 0.9
 ORIENTATION = "orientation"
 _STEPS, _HALVINGS = 60, 30
 _FEW = 20
-"""Degrees of freedom, parameters with a prior deducted, below which the scatter has a lognormal prior."""
+"""Degrees of freedom, parameters with a prior deducted, below which the scatter has a prior."""
 USUAL_SCATTER, SCATTER_SPREAD = {ROBOT: 5e-5, ORIENTATION: 2e-4}, float(np.log(2.0))
-"""Usual scatter of a coordinate, m, or of an orientation, rad, and the standard deviation of its logarithm."""
+"""Usual scatter of a coordinate, m, or of an orientation, rad, and the half width of the Cauchy distribution of its logarithm, which
+leaves room for cameras that scatter a hundred times as much."""
 _ALWAYS = (ROBOT, *OF_INSTRUMENTS, ORIENTATION)
 """Components that the data need not support: points and orientations scatter."""
 _STILL = 1e-5
@@ -131,7 +132,9 @@ class LinearFit:
         unit, first = (METRES, ROBOT) if ROBOT in totals else (RADIANS, ORIENTATION)
         own = [*self.readings.instruments]
         own += [ORIENTATION] if ORIENTATION in totals and first != ORIENTATION else []
-        names = [first, *own, *(["pose"] if self._several else []), "angular", *shared]
+        # few readings tell no kinds of scatter apart
+        kinds = [*(["pose"] if self._several else []), "angular"] if self._tells_scatter else []
+        names = [first, *own, *kinds, *shared]
         levers = {
             name: _lever(moved[self.readings.unit == unit])
             for name, moved in (("angular", self.turns), (TRANSMISSION, self.waves))
@@ -283,15 +286,16 @@ class LinearFit:
         favoured = np.array([self._favour(name) if favour else 0.0 for name in names])
         known, usual = np.zeros(len(names)), np.ones(len(names))
         if not self._tells_scatter and names[0] in USUAL_SCATTER:
-            known[0], usual[0] = 0.5 / SCATTER_SPREAD**2, USUAL_SCATTER[names[0]] ** 2 / scale[0]
+            known[0], usual[0] = 0.25 / SCATTER_SPREAD**2, USUAL_SCATTER[names[0]] ** 2 / scale[0]
 
         def deviance(x: np.ndarray, at: RestrictedLikelihood) -> float:
-            of_prior = 0.5 * float(known @ np.log(x / usual) ** 2)
+            of_prior = 2 * float(np.log1p(known * np.log(x / usual) ** 2).sum())
             return at.deviance - float(favoured @ np.log(x)) + of_prior
 
         for _ in range(_STEPS):
-            slope = at.slopes * scale - (favoured - known * np.log(x / usual)) / x
-            information = at.information * scale * scale[:, None] + np.diag((favoured + known) / x**2)
+            pull = 4 * known / (1 + known * np.log(x / usual) ** 2)
+            slope = at.slopes * scale - (favoured - pull * np.log(x / usual)) / x
+            information = at.information * scale * scale[:, None] + np.diag((favoured + pull) / x**2)
             step = _step(x, slope, information, largest)
             # the factor's logarithm is steep near zero: a step that lands there returns by doubling
             smallest = np.maximum(_SMALLEST, np.where(favoured + known > 0, _TO_ZERO * x, 0.0))

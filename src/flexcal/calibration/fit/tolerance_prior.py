@@ -32,12 +32,14 @@ _SIZES = {"offset": 2e-3, "rad": 1e-3, "m": LENGTH_TOLERANCE}
 """Standard deviations of manufacture before the measurements: of joint zeros, and of other angles and lengths of the joints."""
 _YIELD, _SOFTEST = 1e-3, 1e-4
 """Rotation, rad, by which a joint yields under its largest load, and the largest compliance, rad/(N m), before the measurements."""
-_SCALE = np.log(3.0)
+_SCALE = np.log(2.0)
 """Standard deviation of the logarithm of the factor by which the errors of a kind are larger than these."""
 _LEAST = 3.0
 """Logarithm of the factor by which the scatter may be smaller than usual."""
 _SURELY, _UNSEEN = 30.0, 1e-9
 """Information, in that of the prior, from which this changes little, and, in the largest, below which the poses tell nothing."""
+_MANY = 4
+"""Readings for each parameter from which their scatter is known well enough to say so."""
 _WRONG, _PASSES = 5.0, 4
 """Distance of a point, in the median of all, from which it tells nothing of the others, and how often such points are looked for."""
 _FAR = 3.5
@@ -46,6 +48,8 @@ _TOLD = 0.5
 """Standard deviation after the measurements, over that before, below which these tell a parameter."""
 _ITERATIONS, _HALVINGS, _DIFFERENCE, _STILL = 50, 20, 1e-5, 1e-10
 """Bounds and steps of the search for the factors; it has converged when half the deviance changes by less than the last."""
+_LOUD = 2e-3
+"""Scatter, m, from which the search begins too where few readings make errors look like noise, and noise like errors."""
 _NOISE = "scatter"
 """Key of the scatter, m, beside the factors."""
 _LARGEST = float(np.log(10.0))
@@ -62,7 +66,7 @@ def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     None where points tell all that any poses would so well that these change nothing, and where readings are beyond all numbers.
 
     Errors of the joints are of four kinds: zeros, other angles, lengths, and compliances. How much larger than the usual ones those of a
-    kind are is estimated from the points, by the marginal likelihood with a lognormal prior of a factor of three (empirical Bayes, Morris
+    kind are is estimated from the points, by the marginal likelihood with a lognormal prior of a factor of two (empirical Bayes, Morris
     1983); an angle that is then farther off than chance is known to be as far off alone. Places of points and instruments, and further
     terms, have their plausible size.
     """
@@ -240,6 +244,8 @@ class _Evidence:
 
     def tells_all(self, factors: dict[str, float], own: dict[str, float]) -> bool:
         """Whether the readings tell every combination of errors that they tell at all far better than the prior."""
+        if self._few:
+            return False
         scale = self._scales(factors, own)
         told = scale[:, None] * self.gram * scale / factors[_NOISE] ** 2
         kept = np.array([bool(kind) for kind in self.kinds])
@@ -249,14 +255,26 @@ class _Evidence:
         return not np.any((information > _UNSEEN * information[-1]) & (information < _SURELY))
 
     @property
+    def _few(self) -> bool:
+        """Whether there are too few readings to tell their scatter from errors of the joints for sure."""
+        return self.count < _MANY * len(self.names)
+
+    @property
     def shared(self) -> tuple[str, ...]:
         """Kinds of errors with a factor."""
         return tuple(dict.fromkeys(kind for kind in self.kinds if kind))
 
     def factors(self, own: dict[str, float]) -> dict[str, float]:
         """Most probable factor of every kind, some parameters having standard deviations of their `own`."""
-        x = np.append(np.zeros(len(self.shared)), np.log(self.usual))
-        lower = np.append(np.full(len(self.shared), -4.0), x[-1] - _LEAST)
+        starts = (self.usual, max(self.usual, _LOUD)) if self._few else (self.usual,)
+        x = min((self._search(np.log(start), own) for start in starts), key=lambda found: found[0])[1]
+        named = dict(zip(self.shared, np.exp(x[:-1]).tolist(), strict=True))
+        return named | {_NOISE: float(np.exp(x[-1]))}
+
+    def _search(self, noise: float, own: dict[str, float]) -> tuple[float, np.ndarray]:
+        """Smallest cost, and the log factors and log scatter where it is, from usual factors and the log scatter `noise`."""
+        x = np.append(np.zeros(len(self.shared)), noise)
+        lower = np.append(np.full(len(self.shared), -4.0), np.log(self.usual) - _LEAST)
         upper = np.array([*(_LARGEST if kind == "m" else 6.0 for kind in self.shared), 0.0])
         cost, slope = self._cost(x, own)
         for _ in range(_ITERATIONS):
@@ -280,8 +298,7 @@ class _Evidence:
             x, (cost, slope) = tried, after
             if -expected < _STILL:
                 break
-        named = dict(zip(self.shared, np.exp(x[:-1]).tolist(), strict=True))
-        return named | {_NOISE: float(np.exp(x[-1]))}
+        return cost, x
 
     def farthest(self, factors: dict[str, float], own: dict[str, float]) -> tuple[str, float] | None:
         """Angle of a joint that is farther off than its kind explains, with its deviation."""
@@ -331,6 +348,7 @@ class _Evidence:
             )
             for kind in self.shared
         ]
-        last = along @ mean - square - told.sum() + self.count + scatter / SCATTER_SPREAD
+        last = along @ mean - square - told.sum() + self.count
+        last += 2 * scatter / (1 + scatter**2) / SCATTER_SPREAD
         slope = np.append(np.array(gradient) + x[:-1] / _SCALE**2, last)
-        return float(cost + 0.5 * np.sum((x[:-1] / _SCALE) ** 2) + 0.5 * scatter**2), slope
+        return float(cost + 0.5 * np.sum((x[:-1] / _SCALE) ** 2) + np.log1p(scatter**2)), slope

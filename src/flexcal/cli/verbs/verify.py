@@ -104,7 +104,7 @@ class Verify:
         robot, where = quoted(self.robot), estimates_option(self.estimates)
         if status == "bad":
             return "mend what the verdict names, and verify again; do not use this calibration before that"
-        if status == "care" and "improvement" in reasons:
+        if status == "care" and not {"improvement", "worsening"}.isdisjoint(reasons):
             return f"flexcal calibrate {robot} MORE_POSES…: these poses do not show that the calibration makes the robot more accurate"
         if status == "unknown":
             return f"flexcal verify {robot} MORE_POSES…{where} (flexcal design poses --random plans some)"

@@ -124,9 +124,9 @@ PHRASES: dict[str, dict[str, str]] = {
     "own_verdict": {"else": "the calibration itself was not trusted"},
     "improvement": {
         "good": "the errors are smaller than before",
-        "care": "the errors are no smaller than before, or by chance",
-        "else": "the errors are larger than before",
+        "else": "the errors are no smaller than before, or by chance",
     },
+    "worsening": {"else": "the errors are larger than before"},
     "unseen_poses": {
         "good": "no pose was used for the fit",
         "else": "the calibration was fitted to these poses",
