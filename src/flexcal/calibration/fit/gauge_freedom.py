@@ -104,9 +104,11 @@ def _directions(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Directions (p, r) of the parameters `names` that move the measured points, and those (p, p - r) that do not, in units of `scale`.
 
-    Of the geometry of the URDF, as for the rank of the fit: axes that are not quite parallel show faintly what nothing measures.
+    Of the axes of the URDF, as for the rank of the fit: those that are not quite parallel show faintly what nothing measures. The points
+    are where they were found: where they were only declared, what nothing moves there moves them by its rotation times their distance.
     """
-    drawn = model.with_values({name: 0.0 for name in names if not name.startswith("station.")})
+    found = ("station.", "point.", "tool.length")
+    drawn = model.with_values({name: 0.0 for name in names if not name.startswith(found)})
     columns = predict_measurements(drawn, poses, elastic=False, jacobians=True).jacobian(names)
     columns = columns.reshape(-1, len(names)) * scale
     _, sizes, right = np.linalg.svd(columns, full_matrices=len(columns) < len(names))
