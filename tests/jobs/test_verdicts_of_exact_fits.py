@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from yielding_robot import PANDA_LIKE, YieldingRobot, write_robot
+from yielding_robot import PANDA_LIKE, TX90L_LIKE, UR_LIKE, YieldingRobot, write_robot
 
 from flexcal import RobotModel, calibrate, read_poses
 from flexcal.jobs.accuracy import verify
@@ -44,3 +44,18 @@ def test_points_of_simulations_are_trusted(tmp_path: Path, count: int, noise: fl
     for seed in range(3, 7):
         calibrated, verified, told = judged(tmp_path, seed, count, noise)
         assert (calibrated, told) == ("good", []) and verified in ("good", "care"), seed
+
+
+def test_few_points_of_soft_simulated_arms_are_met(tmp_path: Path) -> None:
+    """To a tenth of a micrometre, where derivatives are not exact enough for a last step: nothing is wrong with data or robot."""
+    for seed, count in ((1, 12), (2, 20), (6, 60), (9, 20)):
+        rng, bodies = np.random.default_rng([48, seed]), (PANDA_LIKE, UR_LIKE, TX90L_LIKE)[seed % 3]
+        compliance = np.zeros((len(bodies), 3))
+        compliance[:, 2] = 3e-5 * 1.6 ** np.arange(len(bodies)) * np.exp(rng.normal(0, 0.4, len(bodies)))
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        model = RobotModel.from_yaml(write_robot(folder, bodies), estimates=False)
+        robot = YieldingRobot(bodies, compliance, rng, 0.0)
+        found = calibrate(model, read_poses(robot.write(folder / "poses.csv", count), model))
+        assert found.trust.status in ("good", "care"), (seed, found.trust.because)
+        assert not any("not converged" in remark for remark in found.document()["remarks"])
