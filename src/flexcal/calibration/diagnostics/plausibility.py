@@ -71,11 +71,11 @@ def residuals_implausible(calibration: GeometricFit) -> bool:
     rows = ~np.isin(np.arange(len(calibration.poses)), calibration.estimate.outliers)
     size = float(np.sqrt(np.mean(calibration.residuals[rows] ** 2)))
     noise = np.where(calibration.poses.seen[:, None], calibration.poses.sigma, 0.0)[rows]
-    return size > max(_moved(calibration), PLAY) and size > NOISY * float(np.sqrt(np.mean(noise**2)))
+    return size > max(_shown(calibration), PLAY) and size > NOISY * float(np.sqrt(np.mean(noise**2)))
 
 
-def _moved(calibration: GeometricFit) -> float:
-    """Displacement of a coordinate of the points, m (root mean square), that is a hundredth of their extent."""
+def _shown(calibration: GeometricFit) -> float:
+    """Error or displacement of a coordinate of the points, m (root mean square), that is a hundredth of their extent."""
     rows = ~np.isin(np.arange(len(calibration.poses)), calibration.estimate.outliers)
     position = _in_base(calibration)[rows]
     extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
@@ -120,7 +120,8 @@ def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...
     found = [_shifted(estimate[n], shift[n], abs(shift[n]) / sizes[n]) for n in far]
     found += deviations_from_prior(calibration)
     moved = displacements(calibration, {s.name: shift[s.name] for s in found})
-    found = [s for s, own in zip(found, moved, strict=True) if own > _moved(calibration)]
+    least = _shown(calibration)
+    found = [s for s, own in zip(found, moved, strict=True) if own > least]
     found.sort(key=lambda s: -s.times / limit.get(s.name, FAR_FROM_PRIOR))
     return (*found, *_far_points(calibration))
 

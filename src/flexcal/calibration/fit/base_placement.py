@@ -23,10 +23,9 @@ def base_errors(model: RobotModel) -> tuple[str, ...]:
     Offset and tilts of the first axis, and the length along it: another place of the base looks the same. Where the second axis crosses
     the first, a rotation of the second about the first too.
     """
-    names = [f"{joint.name}.{key}" for joint in model.joints for key in GEOMETRY]
-    first = [name for name in names if model.joints[model.joint_index(name.rpartition(".")[0])].parent < 0]
     if not model.points:
-        return tuple(first)
+        return tuple(f"{joint.name}.{key}" for joint in model.joints if joint.parent < 0 for key in GEOMETRY)
+    names = [f"{joint.name}.{key}" for joint in model.joints for key in GEOMETRY]
     columns = [model.geometry_columns[name] for name in names]
     reach = np.where([joint.kind == "prismatic" for joint in model.motor_joints], 1.0, np.pi)
     lower, upper = (np.clip(limit, -reach, reach) for limit in joint_limits(model))

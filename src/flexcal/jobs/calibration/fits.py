@@ -175,15 +175,12 @@ class Fits:
 
     def again(self, poses: PoseSet, settings: FitSettings) -> GeometricFit:
         """Fit of the same terms, with the same priors, to some of the poses; without backlash where these are on one flank of it."""
+        same = replace(settings, terms=self.terms, tolerances=False)
         try:
-            return Fits.of(
-                self.model, poses, replace(settings, terms=self.terms, tolerances=False), near=self
-            ).selected
+            return Fits.of(self.model, poses, same, near=self).selected
         except OneFlank:
             terms = tuple(term for term in self.terms if term != "backlash")
-            return Fits.of(
-                self.model, poses, replace(settings, terms=terms, tolerances=False), near=self
-            ).selected
+            return Fits.of(self.model, poses, replace(same, terms=terms), near=self).selected
 
 
 def _with_tolerances(model: RobotModel, poses: PoseSet, settings: FitSettings) -> RobotModel | None:
