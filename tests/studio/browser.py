@@ -106,4 +106,6 @@ def studio(folder: Path, *arguments: str, browser: bool = False) -> Iterator[Run
             running.url, running.said = said[-2].split()[-1], said
             yield running
         finally:
+            if not running.alive:  # shown with the test that fails of it
+                print(f"the studio had ended, {process.exitcode}: {errors.read_text('utf-8')}")
             running.kill()
