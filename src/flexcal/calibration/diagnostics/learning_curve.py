@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.diagnostics.linearised_places import LinearisedPlaces, socket_means
+from flexcal.calibration.diagnostics.linearised_places import LinearisedPlaces
 from flexcal.calibration.fit import GeometricFit, plausible_size
+from flexcal.calibration.kinds import about_sockets, socket_numbers
 from flexcal.units import MILLIMETRE
 
 _SUBSETS = 4
@@ -109,6 +110,5 @@ def _error(
     weight, nominal = prior
     matrix = np.sum([own for own, _ in sums], axis=0) + np.diag(weight)
     change = np.linalg.solve(matrix, np.sum([right for _, right in sums], axis=0) + weight * nominal)
-    sockets = linear.fit.poses.socket
-    assert sockets is not None
-    return float(socket_means(linear.ball(place, change), sockets[linear.rows_of(place)]).mean())
+    number = socket_numbers(linear.fit.poses)[linear.rows_of(place)]
+    return float(np.linalg.norm(about_sockets(linear.ball(place, change), number), axis=1).mean())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,15 +87,6 @@ class LinearisedPlaces:
         right = np.concatenate([self.left[measured], self.expected[self.known]])
         change, _, rank, _ = np.linalg.lstsq(table, right, rcond=1e-10)
         return change, float(np.sum((right - table @ change) ** 2)), len(right) - int(rank)
-
-
-def socket_means(ball: np.ndarray, sockets: Sequence[str] | np.ndarray) -> np.ndarray:
-    """Distances (N,) of the ball from its mean position in each socket."""
-    off = np.empty(len(ball))
-    for socket in dict.fromkeys(np.asarray(sockets).tolist()):
-        rows = np.asarray(sockets) == socket
-        off[rows] = np.linalg.norm(ball[rows] - ball[rows].mean(axis=0), axis=1)
-    return off
 
 
 def _is_random(name: str, fit: GeometricFit) -> bool:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -62,3 +64,59 @@ class Sockets(Kind):
             len(np.unique(poses.position[poses.in_socket & (poses.station == name)], axis=0)) > 1
             for name in poses.fixtures
         )
+
+
+def socket_numbers(poses: PoseSet) -> np.ndarray:
+    """Numbers (N,) from 0 of the sockets that held the ball, each at one place of its fixture; -1 for other rows."""
+    numbers, held = np.full(len(poses), -1), poses.in_socket
+    if held.any() and poses.socket is not None:
+        place, socket = (
+            np.unique(names[held], return_inverse=True)[1] for names in (poses.station, poses.socket)
+        )
+        numbers[held] = np.unique(place * len(poses) + socket, return_inverse=True)[1]
+    return numbers
+
+
+def about_sockets(values: np.ndarray, number: np.ndarray) -> np.ndarray:
+    """Deviations of values (N, …) from the means over rows of equal `number` (N,), one of a negative number being left as it is.
+
+    Nobody knows where a socket is: of the contacts of the ball with it only these deviations are errors.
+    """
+    result = values.copy()
+    for one in np.unique(number[number >= 0]):
+        result[number == one] -= values[number == one].mean(axis=0)
+    return result
+
+
+@dataclass(frozen=True)
+class DeclaredDistance:
+    """Declared `distance`, m, of two `sockets` of the fixture `holder` at one of its places; `numbers` as in `socket_numbers`."""
+
+    place: str
+    sockets: tuple[str, str]
+    holder: str
+    numbers: tuple[int, int]
+    distance: float
+
+    def between(self, ball: np.ndarray, number: np.ndarray) -> np.ndarray:
+        """Vector (3,) m from the first to the second socket, each the mean of the positions `ball` (N, 3) in it."""
+        first, second = (ball[number == one].mean(axis=0) for one in self.numbers)
+        return second - first
+
+
+def declared_distances(poses: PoseSet) -> Iterator[DeclaredDistance]:
+    """Distances between all sockets of a fixture at every one of its places."""
+    if poses.socket is None or poses.holder is None:
+        return
+    number = socket_numbers(poses)
+    for place in poses.fixtures:
+        here = np.flatnonzero(poses.in_socket & (poses.station == place))
+        rows = here[np.sort(np.unique(number[here], return_index=True)[1])]
+        for i, k in combinations(rows.tolist(), 2):
+            yield DeclaredDistance(
+                place,
+                (str(poses.socket[i]), str(poses.socket[k])),
+                str(poses.holder[i]),
+                (int(number[i]), int(number[k])),
+                float(np.linalg.norm(poses.position[k] - poses.position[i])),
+            )

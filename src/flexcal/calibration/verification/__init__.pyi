@@ -10,6 +10,13 @@ from .measured_orientations import (
 )
 from .measured_tilts import MILLIRADIAN, MeasuredTilts, TiltStatistics, tilt_differences
 from .refitted_placement import Refit, RefittedVerification, verify_refitted
+from .socket_contacts import (
+    SocketDistance,
+    SocketVerification,
+    repeated_contacts,
+    require_contacts,
+    verify_contacts,
+)
 from .uncalibrated_robot import UncalibratedErrors, uncalibrated_model
 from .unseen_poses import (
     ErrorCovariance,
@@ -34,6 +41,8 @@ __all__ = [
     "PredictionErrors",
     "Refit",
     "RefittedVerification",
+    "SocketDistance",
+    "SocketVerification",
     "TiltStatistics",
     "UncalibratedErrors",
     "arms_at",
@@ -48,9 +57,12 @@ __all__ = [
     "prediction_document",
     "prediction_errors",
     "prediction_errors_with_covariance",
+    "repeated_contacts",
+    "require_contacts",
     "rigid_placement",
     "tilt_differences",
     "uncalibrated_model",
     "uncalibrated_orientations",
+    "verify_contacts",
     "verify_refitted",
 ]

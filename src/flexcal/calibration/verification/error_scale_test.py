@@ -90,12 +90,15 @@ def error_scale(verification: PredictionErrors, covariance: ErrorCovariance) -> 
             "E-CAL-018",
             "there are no estimated parameters from which an error could be predicted; calibrate the robot first.",
         )
-    mixed = float(np.sum(visits * np.matmul(independent, visits)))
+    concentrated = covariance.concentrated
+    weight = np.ones((1, 1, 1)) if concentrated is None else concentrated[clear, None, None]
+    mixed = float(np.sum(weight * visits * np.matmul(independent, visits)))
+    noise_squares = float(np.sum(weight * independent**2))
     total = float((errors**2).sum())
 
     def mean_and_freedom(square: float) -> tuple[float, float]:
         mean = square * from_parameters + from_noise
-        spread = square**2 * float((gram**2).sum()) + 2 * square * mixed + float((independent**2).sum())
+        spread = square**2 * float((gram**2).sum()) + 2 * square * mixed + noise_squares
         return mean, mean**2 / spread
 
     factor = np.sqrt(max(total - from_noise, 0.0) / max(from_parameters, 1e-30))

@@ -76,7 +76,8 @@ class ErrorCovariance:
     The roots are of the parameters and, the last `shared` of them, of the model error that neighbouring poses have in common; independent
     are instrument and repeatability, None where neither was estimated nor stated. Of these the points of one `visit` (N,) to a pose
     share the columns `common` (N, 3, c) m; None where a pose has one point.
-    `freedom` are the degrees of freedom of the predicted mean square, inf where scatter is known.
+    `freedom` are the degrees of freedom of the predicted mean square, inf where scatter is known. `concentrated` (N,): by how much the
+    squares of the whole independent covariance are larger than those of its blocks, as deviations from a common mean are correlated.
     """
 
     roots: np.ndarray
@@ -85,6 +86,7 @@ class ErrorCovariance:
     freedom: float = np.inf
     visit: np.ndarray | None = None
     common: np.ndarray | None = None
+    concentrated: np.ndarray | None = None
 
     def by_visits(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Roots (G, 3 T, k) and independent covariance (G, 3 T, 3 T) of the points of a mask `rows` (N,), visit by visit."""
@@ -210,9 +212,8 @@ def _freedom(model: RobotModel, at: PredictedMeasurements, poses: PoseSet, predi
 
 def _shared_errors(model: RobotModel, cells: ErrorGroups) -> np.ndarray:
     """Columns (N, 3, k) m of the model error, common to the poses of a cell of the workspace."""
-    return model.value("scatter.model") * block_columns(
-        cells.pose if cells.workspace is None else cells.workspace
-    )
+    blocks = (cells.workspace, cells.order, cells.pose)
+    return model.value("scatter.model") * block_columns(next(own for own in blocks if own is not None))
 
 
 def _independent(

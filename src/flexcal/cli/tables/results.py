@@ -66,7 +66,7 @@ def uncalibrated_rows(document: Mapping[str, Any], *, held: bool = False) -> dic
     }
     if held:
         labels = {
-            "registered": "before, fixture placed by best fit",
+            "registered": "before, sockets placed by best fit",
             "own": "before, the robot's own: ball found too",
         }
     unknown = {"poses": NOTHING, "mean_mm": None, "p90_mm": None, "max_mm": None}

@@ -75,11 +75,13 @@ class Verify:
             }
         if document["ambiguous_poses"]:
             labels["measured_unambiguous"] = "calibrated, flank certain"
-        rows = uncalibrated_rows(document) | {
+        held = bool(verification.poses.in_socket.any())
+        rows = uncalibrated_rows(document, held=held) | {
             label: blocks[key] for key, label in labels.items() if key in blocks
         }
         rms = document["rms_mm"]
-        console.show(error_table("distance to the measured points", rows, rms["expected"]))
+        title = "distance of the ball from its socket" if held else "distance to the measured points"
+        console.show(error_table(title, rows, rms["expected"]))
         if document["orientation"] is not None:
             console.show(orientation_table(document["orientation"]))
         digits = decimals(rms["expected"])
@@ -97,10 +99,10 @@ class Verify:
         console.say(verification.trust.sentence)
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
-        console.finish(document, self._next(verification.trust.status, verification.trust.reasons))
+        console.finish(document, self._next(verification.trust.status, verification.trust.reasons, held=held))
 
-    def _next(self, status: Status, reasons: Sequence[str]) -> str:
-        """The next step after a verdict."""
+    def _next(self, status: Status, reasons: Sequence[str], *, held: bool) -> str:
+        """The next step after a verdict; `held`: of a ball in sockets."""
         robot, where = quoted(self.robot), estimates_option(self.estimates)
         if status == "bad":
             return "mend what the verdict names, and verify again; do not use this calibration before that"
@@ -108,7 +110,8 @@ class Verify:
             return f"flexcal calibrate {robot} MORE_POSES…: these poses do not show that the calibration makes the robot more accurate"
         if status == "unknown":
             return f"flexcal verify {robot} MORE_POSES…{where} (flexcal design poses --random plans some)"
+        verified = "" if held else f" --verification {quoted(self.poses[0])}"
         return (
             f"flexcal export urdf {robot}{where} --out calibrated.urdf, or flexcal compensate {robot} TARGETS.csv{where}; "
-            f"flexcal map {robot}{where} --verification {quoted(self.poses[0])} predicts the accuracy elsewhere"
+            f"flexcal map {robot}{where}{verified} predicts the accuracy elsewhere"
         )

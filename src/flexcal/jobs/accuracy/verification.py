@@ -14,7 +14,8 @@ from flexcal.calibration.comparison import ALUMINIUM
 from flexcal.calibration.diagnostics import ReadingLag
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import StratifiedSample, all_errors
-from flexcal.calibration.measurement import require_points, seen_from_base
+from flexcal.calibration.kinds import about_sockets, socket_numbers
+from flexcal.calibration.measurement import predicted_positions, require_points, seen_from_base
 from flexcal.calibration.verification import (
     CALIBRATED,
     ErrorCovariance,
@@ -23,6 +24,7 @@ from flexcal.calibration.verification import (
     PredictionErrors,
     Refit,
     RefittedVerification,
+    SocketDistance,
     UncalibratedErrors,
     arms_at,
     errors_before,
@@ -30,8 +32,11 @@ from flexcal.calibration.verification import (
     orientation_errors,
     prediction_document,
     prediction_errors_with_covariance,
+    repeated_contacts,
+    require_contacts,
     uncalibrated_model,
     uncalibrated_orientations,
+    verify_contacts,
     verify_refitted,
 )
 from flexcal.data.poses import PoseSet, read_poses, tables_of
@@ -59,6 +64,7 @@ from flexcal.jobs.inputs import (
 )
 from flexcal.jobs.pages import ReportedResult
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, header, write_arm, write_points
+from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, verification_checks
 from flexcal.units import MILLIMETRE
@@ -111,6 +117,9 @@ class Verification(ReportedResult):
     outside_temperatures : float or None
         How far these lie outside the temperatures of a calibration without a term for them, K, at most, negative below them; None where
         either is not known.
+    distances : tuple of SocketDistance
+        Errors of the known distances between sockets, where a ball in these was measured; the errors are then deviations of the ball from
+        its mean position in each socket, m, base frame.
     """
 
     poses: PoseSet
@@ -132,6 +141,7 @@ class Verification(ReportedResult):
     everywhere: ErrorStatistics | None = None
     temperatures: tuple[str, ...] = ()
     outside_temperatures: float | None = None
+    distances: tuple[SocketDistance, ...] = ()
 
     @property
     def residuals(self) -> np.ndarray:
@@ -187,12 +197,14 @@ class Verification(ReportedResult):
             *([self.outside] if self.outside else []),
             *refit_remarks(self.predicted, self.poses, self.refit, self.better),
             *other_sides_remark(self.model, self.poses, self.predicted.expected_rms),
+            *_distance_remark(self.distances),
             *lag_remark(self.lag),
         ]
         if self.uncalibrated:
             remarks.append(
                 f"no calibration pose measured {' and '.join(self.uncalibrated)}: its position on the tool is the declared one, "
-                "whose error is part of these numbers; --refit point fits it to these poses"
+                "whose error is part of these numbers"
+                + ("" if self.poses.in_socket.any() else "; --refit point fits it to these poses")
             )
         if self.fitted:
             which = " and ".join(self.fitted)
@@ -254,6 +266,7 @@ class Verification(ReportedResult):
             "refit": refit_document(self.refit, len(self.poses)),
             "refit_proposed": refit_document(self.better, len(self.poses)),
             "uncalibrated_points": list(self.uncalibrated),
+            "distances": [item.document() for item in self.distances],
             "rms_mm": {
                 "parameters": _rms(result.parameter_rms),
                 "expected": _rms(result.expected_rms) if self.covariance.independent is not None else None,
@@ -286,7 +299,7 @@ def verify(
     robot : CalibratedRobot
         `Calibration.robot`, or ``CalibratedRobot.from_yaml(path)``.
     poses : PoseSet
-        Joint positions (N, n) in rad or m and measured points (N, 3) in m, none of them fitted.
+        Joint positions (N, n) in rad or m and measured points (N, 3) in m, or contacts of a ball with sockets, none of them fitted.
     refit : sequence of {"station", "point"}
         What is placed anew by these poses, the instrument or the measured points; the geometry stays, and errors are then leave-one-out.
     temperature : float, optional
@@ -302,7 +315,8 @@ def verify(
     Raises
     ------
     FlexcalError
-        For measured lengths, and where a station was not calibrated and is not refitted.
+        For measured lengths, where a station was not calibrated and is not refitted, for a socket with one contact, for contacts and
+        points together, and for a refit of contacts.
 
     Examples
     --------
@@ -316,41 +330,74 @@ def verify(
     """
     require_points(poses)
     poses, warm = with_temperature(robot, poses, temperature)
-    require_stations(robot, poses, "station" in refit)
+    held = bool(poses.in_socket.any())
+    if held:
+        _require_contacts(poses, refit)
+    else:
+        require_stations(robot, poses, "station" in refit)
     turned, measured = poses, poses.without_orientations()
     sample = StratifiedSample.of(measured)
+    if held and sample is not None:
+        sample = replace(sample, rows=sample.rows[repeated_contacts(measured.subset(sample.rows))])
     poses = measured if sample is None else measured.subset(sample.rows)
     turned = turned if sample is None else turned.subset(sample.rows)
     unmeasured = tuple(name for name in poses.targets if name not in robot.measured)
     model = robot.probable if unmeasured else robot.model
-    known = all(is_station_identified(model, station) for station in poses.stations)
-    stands = prediction_errors_with_covariance(model, poses) if known else None
-    anew = verify_refitted(model, poses, refit) if refit else None
-    verified = stands if anew is None else (anew.result, anew.covariance)
+    stands = anew = contacts = None
+    if held:
+        contacts = verify_contacts(model, robot.nominal, poses, known=robot.only_sockets)
+        standing, verified = contacts.model, (contacts.result, contacts.covariance)
+        before, registered = contacts.before, None
+    else:
+        known = all(is_station_identified(model, station) for station in poses.stations)
+        stands = prediction_errors_with_covariance(model, poses) if known else None
+        anew = verify_refitted(model, poses, refit) if refit else None
+        verified = stands if anew is None else (anew.result, anew.covariance)
+        standing = model if anew is None else anew.model
+        uncalibrated = uncalibrated_model(robot.nominal, poses)
+        before, registered = uncalibrated.errors(poses), uncalibrated.registered
     assert verified is not None
-    standing = model if anew is None else anew.model
-    uncalibrated = uncalibrated_model(robot.nominal, poses)
     return Verification(
         model=standing,
         poses=poses,
         predicted=verified[0],
         covariance=verified[1],
-        before=uncalibrated.errors(poses),
+        before=before,
         refit=anew,
         as_calibrated=stands[0] if stands is not None and refit else None,
-        better=proposed_refit(model, poses, verified[0]) if anew is None else None,
+        better=proposed_refit(model, poses, verified[0]) if anew is None and not held else None,
         uncalibrated=() if "point" in refit else unmeasured,
-        outside=outside_ranges(robot, measured.q),
+        outside="" if held else outside_ranges(robot, measured.q),
         fitted=fitted_points(robot, poses),
         refused=robot.refused,
         outdated=outdated_remarks(robot),
         sample=sample,
-        everywhere=None if sample is None else all_errors(standing, measured, progress),
+        everywhere=None if sample is None else _errors_everywhere(standing, measured, progress),
         orientation=orientation_errors(standing, turned),
-        orientation_before=uncalibrated_orientations(uncalibrated.registered, turned),
+        orientation_before=uncalibrated_orientations(registered, turned),
         temperatures=warm,
         outside_temperatures=kelvin_outside(robot, poses.temperature),
+        distances=() if contacts is None else contacts.distances,
     )
+
+
+def _errors_everywhere(model: RobotModel, poses: PoseSet, progress: Progress) -> ErrorStatistics:
+    """Errors of a calibrated robot at any number of points, or of contacts about the mean of each socket."""
+    if not poses.in_socket.any():
+        return all_errors(model, poses, progress)
+    ball = predicted_positions(model, poses, progress=progress)
+    return ErrorStatistics.of(about_sockets(ball, socket_numbers(poses)))
+
+
+def _require_contacts(poses: PoseSet, refit: Sequence[Refit]) -> None:
+    """Raise `FlexcalError` for contacts with sockets that verify nothing, and for a `refit` of them."""
+    if refit:
+        raise FlexcalError(
+            "E-RUN-113",
+            "where a socket is follows from the contacts with it, and nothing else is fitted to these: leave --refit out, or, where the "
+            "ball was replaced, calibrate with these contacts.",
+        )
+    require_contacts(poses)
 
 
 def verify_robot(
@@ -373,7 +420,7 @@ def verify_robot(
     require_distinct_files(files)
     robot = CalibratedRobot.from_yaml(robot_file, estimates)
     progress("reading", 0.0)
-    poses = verification_poses(robot, files, placed_again="station" in refit)
+    poses = _read(robot, files)
     progress("reading", 1.0)
     verification = verify(robot, poses, refit=refit, temperature=temperature, progress=progress)
     origin = provenance([robot_file, robot.nominal.urdf, *files], None, robot.stored, tuple(robot.blocks))
@@ -392,9 +439,14 @@ def verification_poses(
 
     Raises `FlexcalError` where they are not that.
     """
+    poses = _read(robot, files)
+    require_stations(robot, poses, placed_again)
+    return poses
+
+
+def _read(robot: CalibratedRobot, files: Sequence[Path]) -> PoseSet:
     poses = read_poses(list(files), robot.model, require_motion=False)
     require_points(poses, " and ".join(str(file) for file in files))
-    require_stations(robot, poses, placed_again)
     return poses
 
 
@@ -405,8 +457,8 @@ def require_stations(robot: CalibratedRobot, poses: PoseSet, placed_again: bool 
     if poses.in_socket.any():
         raise FlexcalError(
             "E-RUN-102",
-            "a ball in sockets cannot verify a robot, because nobody knows where the fixture stands; leave out its places one after the "
-            "other: 'flexcal calibrate' with --hold-out fixture.",
+            "contacts with sockets do not tell where a point is, because nobody knows where the fixture stands; give points of an "
+            "instrument here, and the contacts to 'flexcal verify'.",
         )
     for station in poses.stations:
         if not placed_again and not is_station_identified(robot.model, station):
@@ -416,6 +468,27 @@ def require_stations(robot: CalibratedRobot, poses: PoseSet, placed_again: bool 
                 "calibration, "
                 "or fit it to these poses: 'flexcal verify' with --refit station.",
             )
+
+
+def _distance_remark(distances: Sequence[SocketDistance]) -> tuple[str, ...]:
+    """Sentence on the errors of the known distances between sockets; none without any."""
+    if not distances:
+        return ()
+    worst = max(distances, key=lambda item: abs(item.error))
+    errors, before, std = (
+        None if None in values else _rms(np.array(values, float))
+        for values in (
+            [item.error for item in distances],
+            [item.before for item in distances],
+            [item.std for item in distances],
+        )
+    )
+    predicted = "" if std is None else f", {std:.3f} mm predicted"
+    was = "" if before is None else f"; before the calibration {before:.3f} mm"
+    return (
+        f"the {len(distances)} known distances between sockets are met to {errors:.3f} mm (rms{predicted}), at worst "
+        f"{worst.error / MILLIMETRE:+.3f} mm from {worst.sockets[0]} to {worst.sockets[1]} at {worst.place}{was}",
+    )
 
 
 def _rms(distance: np.ndarray) -> float:

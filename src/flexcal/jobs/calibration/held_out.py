@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.kinds import about_sockets, declared_distances, socket_numbers
 from flexcal.calibration.measurement import predict_measurements, register
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
@@ -105,17 +105,11 @@ def held_out_group(model: RobotModel, poses: PoseSet, known: set[str]) -> HeldOu
             errors[measured & (poses.station == station)] = (
                 own.position - predict_measurements(placed, own).position
             )
-    ball, off = at.kinematics.position, []
-    for fixture in poses.fixtures:
-        own = poses.in_socket & (poses.station == fixture)
-        centres = {}
-        for socket in dict.fromkeys(poses.socket[own].tolist()) if poses.socket is not None else ():
-            rows = np.flatnonzero(own & (poses.socket == socket))
-            centre = ball[rows].mean(axis=0)
-            errors[rows] = ball[rows] - centre
-            centres[socket] = centre, poses.position[rows[0]]
-        for (found, declared), (other, place) in combinations(centres.values(), 2):
-            off.append(abs(np.linalg.norm(found - other) - np.linalg.norm(declared - place)))
+    ball, number = at.kinematics.position, socket_numbers(poses)
+    errors[~measured] = about_sockets(ball, number)[~measured]
+    off = [
+        abs(np.linalg.norm(item.between(ball, number)) - item.distance) for item in declared_distances(poses)
+    ]
     return HeldOutGroup(ErrorStatistics.of(errors), float(np.mean(off)) if off else None)
 
 

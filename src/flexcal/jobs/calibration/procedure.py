@@ -21,6 +21,7 @@ from flexcal.calibration.fit import (
     StratifiedSample,
     all_errors,
 )
+from flexcal.calibration.measurement import kind_names
 from flexcal.calibration.term_selection import cross_validated
 from flexcal.calibration.verification import uncalibrated_model, uncalibrated_orientations
 from flexcal.data.poses import PoseSet
@@ -37,7 +38,7 @@ from flexcal.jobs.calibration.joint_ranges import joint_extents
 from flexcal.jobs.calibration.odd_temperatures import plausible_temperatures, with_plausible_temperatures
 from flexcal.jobs.calibration.result import Calibration
 from flexcal.jobs.inputs import is_station_identified
-from flexcal.model.robot import TARGETS, TARGETS_BETWEEN, ZERO_DRIFT, RobotModel
+from flexcal.model.robot import READINGS, TARGETS, TARGETS_BETWEEN, ZERO_DRIFT, RobotModel
 from flexcal.progress import Progress, silent
 
 AUTO = "auto"
@@ -160,6 +161,7 @@ def calibrate(
         "secant_scale": secant_scale,
         "elasticity": elasticity,
         TARGETS.removeprefix("option."): TARGETS_BETWEEN.join(poses.targets),
+        READINGS.removeprefix("option."): TARGETS_BETWEEN.join(dict.fromkeys(kind_names(poses.pointed))),
     } | ({"bearings": fits.model.bearings} if fits.model.has_bearings else {})
     extent = Extent.of(selected)
     ranges = joint_extents(selected.model, selected.poses.q) | _temperatures(selected.poses)

@@ -15,6 +15,7 @@ from flexcal.files.formats import BLOCKS, Block, block_sha256, read_estimates, r
 from flexcal.jobs.result_files import ESTIMATES
 from flexcal.model.robot import (
     DECLARED,
+    READINGS,
     TARGETS,
     TARGETS_BETWEEN,
     Posterior,
@@ -105,6 +106,11 @@ class CalibratedRobot:
     def measured(self) -> tuple[str, ...]:
         """Points measured in the calibration."""
         return tuple(name for name in self.targets if not is_inclinometer(self.nominal, name))
+
+    @property
+    def only_sockets(self) -> bool:
+        """Whether a ball in sockets was all that the calibration measured, so that the scatter of the robot is that of contacts."""
+        return self.blocks["calibration"].provenance.get(READINGS) == "sockets"
 
     @property
     def refused(self) -> str:

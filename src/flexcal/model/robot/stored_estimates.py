@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 TARGETS = "option.targets"
 """Provenance key of the block `calibration`: the measured points."""
+READINGS = "option.readings"
+"""Provenance key of the block `calibration`: the kinds of measurements."""
 TARGETS_BETWEEN = ", "
 PAYLOAD_FRAME = "frame"
 """Provenance key of the block `payload`: the URDF frame of its values."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import erfc, sqrt
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ FEW_NUMBERS = 4.0
 OVERSTATED = 0.5
 """Noise over the stated sigma below which the stated one counts as wrong."""
 CLEAR_GAP = 3.0
+_UNLIKELY = 0.01
+"""Probability below which a deviation is no chance."""
 _PLACES = 9
 """Numbers of the place of an instrument and a point."""
 BEYOND = 3.0
@@ -371,14 +374,42 @@ def check_outliers(outliers: int, fit: ErrorStatistics) -> Check:
     return Check(question, "No.", "good")
 
 
-def check_known_points(uncalibrated: Sequence[str]) -> Check:
-    """Check for points `uncalibrated`, measured in no calibration pose."""
+def check_known_points(uncalibrated: Sequence[str], *, held: bool) -> Check:
+    """Check for points `uncalibrated`, measured in no calibration pose; `held`: balls in sockets."""
     return Check(
         "Did the calibration measure these points?",
         f"Not {' and '.join(uncalibrated)}: where it is on the tool is as declared, and an error of that is in these numbers. "
-        "flexcal verify --refit point finds it from these poses.",
+        + (
+            "Calibrate with contacts of it."
+            if held
+            else "flexcal verify --refit point finds it from these poses."
+        ),
         "care",
     )
+
+
+def check_distances(distances: Sequence[Mapping[str, Any]]) -> tuple[Check, ...]:
+    """Whether known distances between sockets are met as predicted; `distances` are those of results.json, none of which may be known."""
+    errors, stds = (np.array([item[key] for item in distances], float) for key in ("error_mm", "std_mm"))
+    if not len(errors) or not np.isfinite(stds).all():
+        return ()
+    question, worst = "Are the sockets as far apart as declared?", int(np.argmax(np.abs(errors) / stds))
+    # of the largest deviation, by Bonferroni's bound
+    chance = min(1.0, len(errors) * erfc(abs(float(errors[worst])) / float(stds[worst]) / sqrt(2)))
+    answer = (
+        f"{' to '.join(distances[worst]['sockets'])} at {distances[worst]['place']} are {errors[worst]:+.3f} mm off, with "
+        f"{stds[worst]:.3f} mm predicted (1σ; p = {p_value(chance)} among {len(errors)})."
+    )
+    if chance < _UNLIKELY:
+        return (
+            Check(
+                question,
+                f"No: {answer} The fixture or the robot is larger or smaller than at the calibration.",
+                "care",
+                "distances",
+            ),
+        )
+    return (Check(question, f"Yes, within chance: {answer}", "good", "distances"),)
 
 
 def check_setup_unchanged(proposed: Mapping[str, Any]) -> Check:

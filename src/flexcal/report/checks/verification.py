@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.calibration.kinds import socket_numbers
 from flexcal.calibration.verification import OWN, MeasuredPoints
 from flexcal.report.checks.against_nominal import check_own_verdict, check_smaller_errors
 from flexcal.report.checks.pose_errors import (
     check_claimed_uncertainty,
+    check_distances,
     check_enough,
     check_flanks,
     check_known_points,
@@ -36,9 +38,14 @@ def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> t
         *check_own_verdict(results.get("refused", "")),
         *check_lag(results.get("lag")),
         *_improvement(results, points),
+        *check_distances(results.get("distances", ())),
         *flanks,
         *(
-            (check_known_points(results["uncalibrated_points"]).named("calibrated_points"),)
+            (
+                check_known_points(
+                    results["uncalibrated_points"], held=bool(points.poses.in_socket.any())
+                ).named("calibrated_points"),
+            )
             if results.get("uncalibrated_points")
             else ()
         ),
@@ -56,6 +63,11 @@ def _improvement(results: Mapping[str, Any], points: MeasuredPoints) -> tuple[Ch
     if before is None or results.get("uncalibrated_points") or results.get("refit_proposed"):
         return ()
     poses = points.poses
-    fitted = _STATION * len(poses.stations) + (_POINT * len(poses.targets) if OWN in points.errors else 0)
-    sizes = np.linalg.norm(before, axis=1) / np.sqrt(1 - fitted / (3 * len(poses)))
+    fitted = _POINT * len(poses.targets) if OWN in points.errors else 0
+    numbers = 3 * len(poses)
+    if poses.in_socket.any():  # of either robot the sockets are found from these contacts
+        numbers -= _POINT * len(np.unique(socket_numbers(poses)))
+    else:
+        fitted += _STATION * len(poses.stations)
+    sizes = np.linalg.norm(before, axis=1) / np.sqrt(1 - fitted / numbers)
     return (check_smaller_errors(sizes, np.linalg.norm(points.calibrated, axis=1)),)

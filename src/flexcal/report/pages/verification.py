@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ from flexcal.report.layout import (
     Table,
     Text,
     Verdict,
+    document_millimetres,
     millimetres,
     sentences,
     statistics_cells,
@@ -43,6 +44,8 @@ _HEADLINES: dict[Status, str] = {
     "bad": "Less accurate than predicted",
     "unknown": "Measured; whether the calibration can be trusted cannot be judged",
 }
+_MOST = 24
+"""Largest number of distances between sockets in a table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +68,10 @@ class VerificationStudy:
 
 def verification_page(study: VerificationStudy) -> Page:
     """The page before it becomes HTML."""
-    results = study.results
+    results, words = study.results, MeasuredWords.of(study.points.poses)
     return Page(
         title=f"{results['robot']}: verification report",
-        subtitle=f"Accuracy of the calibrated robot at {len(study.points.poses)} measured points"
+        subtitle=f"Accuracy of the calibrated robot at {len(study.points.poses)} measured {words.rows}"
         + ("" if results["fitted"] else " outside the fit"),
         verdict=_verdict(study),
         sections=(
@@ -86,15 +89,16 @@ def _verdict(study: VerificationStudy) -> Verdict:
     before = study.points.before
     checks = verification_checks(study.results, study.points)
     trust = Trust(checks)
-    noun = "points" if fitted else "fresh points"
+    words = MeasuredWords.of(study.points.poses)
+    noun = words.rows if fitted else f"fresh {words.rows}"
     return Verdict(
         trust.status,
         _HEADLINES[trust.status],
         f"At {after.poses} {noun} errors of the calibrated model have a P90 of {millimetres(after.p90)} mm and a maximum of "
-        f"{millimetres(after.max)} mm. The instrument's noise is included.{_refitted(study.results)}",
-        headline_facts(before, after, trust, "points"),
+        f"{millimetres(after.max)} mm. {words.noise[0].upper()}{words.noise[1:]} is included.{_refitted(study.results)}",
+        headline_facts(before, after, trust, words.rows),
         (*uncalibrated_ranges(study.points), error_range("calibrated", after, "elastic")),
-        f"Error of the robot at {after.poses} {noun}, against the instrument",
+        f"Error of the robot at {after.poses} {noun}, against {words.against}",
         checks,
     )
 
@@ -126,23 +130,25 @@ def _errors_section(study: VerificationStudy) -> Section:
         certain = result.unambiguous
         rows.append(("… where the backlash flank is certain", str(certain.poses), *statistics_cells(certain)))
     poses, remarks = study.points.poses, study.results["remarks"]
+    words = MeasuredWords.of(poses)
     blocks: list[Block] = [
         Table(
             "table-accuracy",
             "Distances",
-            ("model", "points", "mean / mm", "P90 / mm", "max / mm"),
+            ("model", words.rows, "mean / mm", "P90 / mm", "max / mm"),
             tuple(rows),
-            note=MeasuredWords.of(study.points.poses).note,
+            note=words.note,
         ),
         *orientation_tables(study.results.get("orientation")),
+        *_distance_table(study.results.get("distances", ())),
         *([Text((), "Remarks", sentences(remarks))] if remarks else []),
         arm_figure(study.arms, poses),
         FigureBlock(
             "figure-errors",
-            "Error at every point",
+            f"Error at every {words.rows.removesuffix('s')}",
             verification_errors(poses, series, result, None),
-            "Distance between measured and predicted point, on a logarithmic scale.",
-            f"Errors of {result.all.poses} points, up to {millimetres(result.all.max)} mm.",
+            f"{words.distance}, on a logarithmic scale.",
+            f"Errors of {result.all.poses} {words.rows}, up to {millimetres(result.all.max)} mm.",
         ),
         FigureBlock(
             "figure-distribution",
@@ -158,16 +164,42 @@ def _errors_section(study: VerificationStudy) -> Section:
                 "figure-predicted",
                 "Observed against predicted errors",
                 predicted_quantiles(result),
-                "The covariance of the parameters and the instrument's noise predict how large errors should be. Points on the dashed "
+                f"The covariance of the parameters and {words.noise} predict how large errors should be. Points on the dashed "
                 "line: the prediction was right. Above it: errors are larger than predicted. Below: smaller.",
                 "Sorted observed errors against predicted quantiles.",
             )
         )
     return Section(
         "errors",
-        "Errors at the measured points" if study.results["fitted"] else "Errors at fresh points",
+        f"Errors at the measured {words.rows}"
+        if study.results["fitted"]
+        else f"Errors at fresh {words.rows}",
         "",
         tuple(blocks),
+    )
+
+
+def _distance_table(distances: Sequence[Mapping[str, Any]]) -> tuple[Table, ...]:
+    """Errors of the known distances between sockets; `distances` are those of results.json."""
+    if not distances:
+        return ()
+    rows = tuple(
+        (
+            f"{item['place']}: {' to '.join(item['sockets'])}",
+            *(document_millimetres(item[key]) for key in ("declared_mm", "before_mm", "error_mm", "std_mm")),
+        )
+        for item in distances[:_MOST]
+    )
+    more = len(distances) - len(rows)
+    return (
+        Table(
+            "table-distances",
+            "Distances between sockets",
+            ("sockets", "declared / mm", "error before / mm", "error calibrated / mm", "predicted 1σ / mm"),
+            rows,
+            note="Found minus declared, each socket being the mean of the predicted positions of the ball in it."
+            + (f" And {more} more, listed in results.json." if more > 0 else ""),
+        ),
     )
 
 
@@ -176,5 +208,10 @@ def _residuals_section(study: VerificationStudy) -> Section:
         "residuals",
         "Errors by joint, time and position",
         "Errors that depend on a joint, on time or on the position in the working volume indicate a term that the model lacks.",
-        residual_blocks(study.results["joints"], study.points.poses, study.points.calibrated),
+        residual_blocks(
+            study.results["joints"],
+            study.points.poses,
+            study.points.calibrated,
+            study.arms if study.points.poses.in_socket.any() else None,
+        ),
     )
