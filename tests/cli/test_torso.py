@@ -147,8 +147,6 @@ def test_a_probe_on_one_hand_calibrates_the_arms_relative_to_each_other(tmp_path
 
 def test_a_station_on_the_robot_has_no_place_in_the_base_frame(tmp_path: Path) -> None:
     robot = StrangerTorso(2, joints=4)
-    with refused("E-ROBOT-061", "robot.yaml"):
-        RobotModel.from_yaml(robot.write(tmp_path, "stations: {probe: {frame: left_hand, xyz: [0, 0, 1]}}\n"))
     with refused("E-ROBOT-028", "left_foot"):
         RobotModel.from_yaml(robot.write(tmp_path, "stations: {probe: {frame: left_foot}}\n"))
 

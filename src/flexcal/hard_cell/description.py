@@ -105,7 +105,7 @@ def read_description(robot_file: Path) -> ArmDescription:
     index = {link.name: k for k, link in enumerate(links)}
     (point, declared), *_ = config.points.items()
     station, entry = next(iter(config.stations.items()), ("tracker", None))
-    place = None if entry is None else entry.xyz
+    place = None if entry is None else entry.in_base
     payload = config.payload
 
     def drive(values: tuple[float, ...] | None, otherwise: float = 0.0) -> np.ndarray:

@@ -88,7 +88,7 @@ def measured_poses(
         point = point + share[:, None] * mismatch.temperature_drift * direction / np.linalg.norm(direction)
     station = truth.config.stations.get(truth.stations.names[0])
     seen = in_instrument(truth, point)
-    place = None if station is None else station.xyz
+    place = None if station is None else station.in_base
     stand = in_instrument(truth, np.zeros(3) if place is None else np.array(place))
     noise = tracker_sigma(sensors, np.linalg.norm(seen - stand, axis=1))
     position = seen + noise[:, None] * rng.standard_normal(point.shape)

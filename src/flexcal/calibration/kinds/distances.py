@@ -91,7 +91,7 @@ class Distances(Kind):
                 "in space.",
             )
         anchor, zero, misfit = _centre_of_distances(targets - centre, readings[:, 0])
-        require_fitting(station, misfit, targets)
+        require_fitting(model, station, misfit, targets)
         return station_numbers(-(anchor + centre), np.zeros(3), zero)
 
     def place(self, model: RobotModel, poses: PoseSet, station: str, *, turned: bool) -> Sequence[str]:

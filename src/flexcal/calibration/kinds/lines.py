@@ -40,7 +40,7 @@ class Lines(Kind):
         """As `Kind.start`."""
         require_targets(station, targets, 4)
         direction, through, misfit = _line(targets)
-        require_fitting(station, misfit, targets)
+        require_fitting(model, station, misfit, targets)
         return station_along(direction, through)
 
     def place(self, model: RobotModel, poses: PoseSet, station: str, *, turned: bool) -> Sequence[str]:

@@ -48,7 +48,7 @@ class Planes(Kind):
                 f"the points touched on '{station}' lie on a line; touch the plane where it is wide.",
             )
         normal, through, misfit = _plane(targets, readings[:, 2])
-        require_fitting(station, misfit, targets)
+        require_fitting(model, station, misfit, targets)
         return station_along(normal, through)
 
     def place(self, model: RobotModel, poses: PoseSet, station: str, *, turned: bool) -> Sequence[str]:

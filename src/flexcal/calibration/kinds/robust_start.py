@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.model.parts import vector_rotation
+from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
 PASSES = 50
@@ -17,6 +18,8 @@ FLAT = 1e-2
 """Ratio of extents of the targets below which they lie in a plane, or on a line."""
 _FOREIGN = 0.05
 """Median misfit, relative to the extent of the targets, above which readings and robot do not belong together."""
+_NOMINAL = 0.01
+"""Misfit, relative to the reach, that a nominal robot may have."""
 _MEDIAN = 0.6745
 """Median of the absolute value of a standard normal variable."""
 _CAUCHY = 2.385
@@ -32,11 +35,14 @@ def require_targets(name: str, targets: np.ndarray, least: int) -> None:
         )
 
 
-def require_fitting(name: str, misfit: np.ndarray, targets: np.ndarray) -> None:
-    """Raise `FlexcalError` where the `misfit` (K,), m, of the readings is that of other targets than these (K, 3)."""
+def require_fitting(model: RobotModel, name: str, misfit: np.ndarray, targets: np.ndarray) -> None:
+    """Raise `FlexcalError` where the `misfit` (K,), m, of the readings is that of other targets than these (K, 3).
+
+    Targets on a small ball lie close together whatever the errors of the nominal robot.
+    """
     extents = np.linalg.svd(targets - np.median(targets, axis=0), compute_uv=False)
     away, extent = float(np.median(np.abs(misfit))), float(extents[0]) / np.sqrt(len(targets))
-    if away > _FOREIGN * extent:
+    if away > max(_FOREIGN * extent, _NOMINAL * model.reach):
         raise FlexcalError(
             "E-CAL-023",
             f"the readings of '{name}' differ by {away / MILLIMETRE:.0f} mm (median) from those at any place: check their unit, the order "

@@ -164,9 +164,9 @@ def _tools(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, np.ndarray]:
 def _declared(model: RobotModel, poses: PoseSet) -> RobotModel | None:
     """Robot in the instrument's frame, if that is the base frame or at the declared stations; else None."""
     places = {
-        name: np.array(station.xyz)
+        name: np.array(station.in_base)
         for name, station in model.config.stations.items()
-        if station.xyz is not None
+        if station.in_base is not None
     }
     beside = model.with_values(
         {

@@ -17,7 +17,7 @@ TARGET_CLEARANCE = 0.03
 
 
 def station_position(model: RobotModel, station: str | None = None) -> np.ndarray | None:
-    """Position (3,), m, of the instrument in the base frame; None if robot.yaml gives none. The first station without a name.
+    """Position (3,), m, of the instrument in the base frame; None if robot.yaml gives none there. The first station without a name.
 
     Raises `FlexcalError` for an unknown name.
     """
@@ -28,7 +28,7 @@ def station_position(model: RobotModel, station: str | None = None) -> np.ndarra
             f"there is no station '{station}' in {model.path}; there are {', '.join(model.stations.names)}.",
         )
     entry = declared.get(model.stations.names[0] if station is None else station)
-    return None if entry is None or entry.xyz is None else np.array(entry.xyz)
+    return None if entry is None or entry.in_base is None else np.array(entry.in_base)
 
 
 def visible(checker: CollisionChecker, q: np.ndarray, setup: MeasuringSetup = STANDARD) -> np.ndarray:

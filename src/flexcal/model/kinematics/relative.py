@@ -11,7 +11,7 @@ from flexcal.model.robot import RobotModel
 def carrier_kinematics(
     model: RobotModel, q: np.ndarray, deflection: np.ndarray, stations: np.ndarray, *, jacobians: bool
 ) -> PointKinematics | None:
-    """Kinematics of the frames that carry the `stations` (N,) at `q` (N, n), bent by `deflection` (N, n, 3); None where none is carried.
+    """Kinematics of where the robot carries the `stations` (N,) at `q` (N, n), bent by `deflection` (N, n, 3); None where it carries none.
 
     Instruments that stand still are at the base. Without `jacobians` these are empty. Raises `FlexcalError` for a robot with joints that
     follow others.
@@ -30,7 +30,7 @@ def carrier_kinematics(
             frame.joint,
             np.ascontiguousarray(frame.rotation),
             np.ascontiguousarray(frame.translation),
-            np.zeros(3),
+            np.ascontiguousarray(frame.xyz),
             np.ascontiguousarray(model.geometry.errors),
             np.zeros(6),
             np.ascontiguousarray(q[own]),

@@ -37,10 +37,10 @@ def point_ends(model: RobotModel, names: np.ndarray) -> Ends:
 
 
 def carrier_ends(model: RobotModel) -> Ends:
-    """Origins of the frames that carry instruments, by station."""
+    """Nominal places of the instruments that the robot carries, by station."""
     lengths = model.geometry.errors[:, 3:]
     return {
-        name: (frame.joint, frame.translation + lengths[frame.joint])
+        name: (frame.joint, frame.translation + frame.rotation @ frame.xyz + lengths[frame.joint])
         for name, frame in model.carriers.items()
     }
 

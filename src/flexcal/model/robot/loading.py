@@ -99,7 +99,7 @@ def read_robot(robot_type: type[RobotModel], file: YamlFile) -> RobotModel:
         payload=payload,
         force_sensor=_force_sensor(file, description, config),
         carriers={
-            name: _carrier(file, description, name, entry.frame)
+            name: _carrier(file, description, name, config)
             for name, entry in config.stations.items()
             if entry.frame is not None
         },
@@ -204,10 +204,20 @@ def _point(file: YamlFile, description: Description, name: str, config: RobotCon
     return Point(name, entry.frame, frame.joint, frame.rotation, frame.translation, np.array(entry.xyz))
 
 
-def _carrier(file: YamlFile, description: Description, station: str, name: str) -> Point:
-    """Frame that carries a station's instrument."""
-    frame = _frame(file, ("stations", station, "frame"), description, name)
-    return Point(station, name, frame.joint, frame.rotation, frame.translation, np.zeros(3))
+def _carrier(file: YamlFile, description: Description, station: str, config: RobotConfig) -> Point:
+    """Nominal place of a station's instrument in the frame that carries it."""
+    entry, touched = config.stations[station], config.measurements.get(station)
+    assert entry.frame is not None
+    if getattr(touched, "xyz", None) is not None:
+        raise file.error(
+            "E-ROBOT-061",
+            ("measurements", station, "xyz"),
+            f"'{station}' moves with {entry.frame}, so it has no place in the base frame; give its xyz in the axes of {entry.frame} under "
+            "`stations:`.",
+        )
+    frame = _frame(file, ("stations", station, "frame"), description, entry.frame)
+    xyz = np.array(entry.xyz or (0.0, 0.0, 0.0))
+    return Point(station, entry.frame, frame.joint, frame.rotation, frame.translation, xyz)
 
 
 def _inclinometers(file: YamlFile, description: Description, config: RobotConfig) -> dict[str, Point]:

@@ -98,9 +98,10 @@ class ForceSensorConfig:
 
 @dataclass(frozen=True)
 class StationConfig:
-    """Place of the measuring instrument in the robot's base frame (m), for planning only; the calibration estimates it.
+    """Place `xyz` (m) of the measuring instrument in the robot's base frame, for planning only; the calibration estimates it.
 
-    `frame`: URDF frame that carries the instrument, as the hand of another arm; where it is on that is estimated too.
+    `frame`: URDF frame that carries the instrument, or a touched sphere, as the hand of another arm; `xyz` is then its nominal place in
+    the axes of that frame, from where the estimated one counts.
     """
 
     xyz: Triple | None = None
@@ -108,13 +109,13 @@ class StationConfig:
     frame: str | None = None
 
     def __post_init__(self) -> None:
-        if self.line_of_sight and self.xyz is None:
+        if self.line_of_sight and self.in_base is None:
             raise FlexcalError("E-ROBOT-020", "line_of_sight needs the station's xyz (m in the base frame).")
-        if self.frame is not None and self.xyz is not None:
-            raise FlexcalError(
-                "E-ROBOT-061",
-                "a station has a frame of the robot that carries it, or xyz in the base frame; keep one.",
-            )
+
+    @property
+    def in_base(self) -> Triple | None:
+        """Declared place in the base frame, m; None where there is none, and for an instrument on the robot."""
+        return self.xyz if self.frame is None else None
 
 
 @dataclass(frozen=True)

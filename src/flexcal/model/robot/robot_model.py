@@ -96,7 +96,7 @@ class RobotModel:
     posterior : Posterior
         Joint covariance of the parameters that were estimated.
     carriers : mapping of Point
-        Origins of the frames that carry an instrument, by the name of its station.
+        Nominal places of the instruments that the robot carries, by the name of the station.
     sensors : mapping of ArmSensor
         Sensors on the arm by name.
     lenses : Lenses

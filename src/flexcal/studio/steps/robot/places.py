@@ -91,9 +91,9 @@ def places_of(model: RobotModel) -> list[Place]:
         load = config.payload
         places.append(Place("payload", "payload", load.frame, _millimetres(load.com), load.mass))
     places += [
-        Place("instrument", name, BASE, _millimetres(station.xyz))
+        Place("instrument", name, BASE, _millimetres(station.in_base))
         for name, station in config.stations.items()
-        if station.xyz is not None
+        if station.in_base is not None
     ]
     return places
 
