@@ -63,6 +63,21 @@ def test_every_column(simulate: Callable, suffixes: tuple, step: float, relative
         assert np.abs(jacobian[:, :, k] - expected).max() <= relative * size + 1e-9, name
 
 
+def test_geometry_changes_the_torque_that_turns_a_joint(simulate: Callable, tx90l: RobotModel) -> None:
+    """Of joints that yield by a degree under gravity, of a robot whose axes are off by ten milliradians."""
+    simulated, rng = simulate(3, 15), np.random.default_rng(4)
+    names = [f"{owner}.{key}" for owner in (*tx90l.joint_names, "tool") for key in GEOMETRY]
+    off = dict(zip(names, rng.normal(0, 1e-2, len(names)).tolist(), strict=True))
+    soft = {f"joint_{k}.gravity_compliance": 2e-3 for k in (4, 5, 6)}
+    robot = simulated.robot.with_values(off | soft)
+    at = predict_measurements(robot, simulated.poses, jacobians=True)
+    assert np.abs(at.rest.torque[:, 3:] * 2e-3).max() > 0.02
+    jacobian = at.jacobian(names)
+    for k, name in enumerate(names):
+        expected = slope(robot, simulated.poses, name, 1e-5, at.rest.flank)
+        np.testing.assert_allclose(jacobian[:, :, k], expected, atol=2e-8, rtol=0, err_msg=name)
+
+
 def test_columns_of_drives_that_harden(simulate: Callable) -> None:
     """Stiffness acts through the tangent of a drive, and the hardening by the cube of its twist; to the load of the undeflected arm."""
     simulated = simulate(3, 25)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -26,8 +26,6 @@ from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
 
 _PASSES = 8
-_MET = 2e-6
-"""Residual of a coordinate, m (root mean square), below which a fit has met the points, whatever its last steps did."""
 _ROUGH, _NEAR = 0.1, 1e-3
 """Relative offsets at which a fit is close enough to estimate its errors: at first, where directions are free that noise hides and that
 take many steps; and once these are held (Bates and Watts 1981).
@@ -303,9 +301,6 @@ def _polished(fitted: FittedPoints, loss: Loss | PlainLoss, tolerance: float) ->
 def _calibration(fitted: FittedPoints) -> GeometricFit:
     fit = fitted.fit
     estimate = fitted.whole_estimate()
-    met = fitted.at.residual[fitted.at.readings.points]
-    if estimate.status == "stalled" and met.size and np.sqrt(np.mean(met**2)) < _MET:
-        estimate = replace(estimate, status="converged")
     calibrated = fitted.model.with_estimate(estimate)
     return GeometricFit(
         model=calibrated,

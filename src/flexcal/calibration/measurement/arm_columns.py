@@ -27,6 +27,7 @@ from flexcal.model.robot import (
 )
 from flexcal.model.statics import (
     carried_mass,
+    gravity_torque_by_geometry,
     transmission_column,
     twist_by_hardening,
     twist_from_torque,
@@ -91,6 +92,14 @@ class ArmColumns:
         if self.at.rest.axes.size:
             coupling = self.at.by_row(self.at.rest.coupling)
             columns[:, :, : len(self.at.model.geometry_columns)] += np.matmul(self._by_load, coupling)
+        compliance = self.at.model.geometry.gravity_compliance
+        if yielding := np.flatnonzero(compliance).tolist():
+            # gravity turns joints by another torque where it has other levers
+            model, poses = self.at.model, self.at.poses
+            masses = carried_mass(model, poses.payload, len(poses))
+            slopes = gravity_torque_by_geometry(model, poses.q, masses)[:, yielding]
+            turned = columns[:, :, [6 * joint for joint in yielding]] * compliance[yielding]
+            columns[:, :, : slopes.shape[2]] -= np.matmul(turned, self.at.by_row(slopes))
         return columns
 
     def _point(self, target: str, key: str) -> np.ndarray:
