@@ -227,27 +227,19 @@ def gravity_regressor(
     model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
 ) -> np.ndarray:
     """Derivative (samples, N, 4 N) of `gravity_torque` with respect to mass and first moment of each link, payload included."""
-    return _torque_slopes(model, q, payload)[0]
+    axes = _twists(model)
+    _, deflection, regressor, _ = _held_rigidly(model, q, payload, axes, sensitivities=True)
+    joints = len(model.joints)
+    result = np.zeros((len(deflection), joints, 4 * joints))
+    result[:, [joint for joint, _ in axes]] = regressor
+    return result
 
 
 def gravity_torque_by_geometry(
-    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
+    model: RobotModel, q: np.ndarray, joints: list[int], payload: np.ndarray | float | None = None
 ) -> np.ndarray:
-    """Derivative (samples, N, G) of `gravity_torque` with respect to the errors of `RobotModel.geometry_columns`."""
-    return _torque_slopes(model, q, payload)[1]
-
-
-def _torque_slopes(
-    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None
-) -> tuple[np.ndarray, np.ndarray]:
-    axes = _twists(model)
-    turning = [joint for joint, _ in axes]
-    slopes = []
-    for own in _held_rigidly(model, q, payload, axes, sensitivities=True)[2:]:
-        whole = np.zeros((len(own), len(model.joints), own.shape[2]))
-        whole[:, turning] = own
-        slopes.append(whole)
-    return slopes[0], slopes[1]
+    """Derivative (samples, len(joints), G) of `gravity_torque` of some joints by the errors of `RobotModel.geometry_columns`."""
+    return _held_rigidly(model, q, payload, [(joint, 2) for joint in joints], sensitivities=True)[3]
 
 
 def spring_loads(
