@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.calibration.error_model import LARGEST_WAVE, ErrorComponents, LinearFit, joint_rotation_jacobian
+from flexcal.calibration.fit.estimated_tolerances import widening
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem
 from flexcal.calibration.fit.practical_identifiability import Undetermined, cause_of, undetermined
 from flexcal.calibration.fit.temperature_evidence import TemperatureEvidence, time_columns, widened
@@ -237,7 +238,8 @@ class FittedPoints:
     def _independent_of_time(self) -> np.ndarray:
         """Covariance (p, p) of the estimate under errors V, where the weights V₀ assume independent, isotropic errors.
 
-        Σ + G (V - V₀) Gᵀ with the estimate's response G = Σ Aᵀ V₀⁻¹ to errors of the points; Σ has the prior in it.
+        Σ + G (V - V₀) Gᵀ with the estimate's response G = Σ Aᵀ V₀⁻¹ to errors of the points; Σ has the prior in it, to which is added what
+        its sizes are uncertain by.
         """
         estimate, scatter, task = self.estimate, self.scatter, self.task
         slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
@@ -250,7 +252,23 @@ class FittedPoints:
         visits = linear.cells.gathered(respond)
         spread = np.einsum("gip,gij,gjq->pq", visits, jointly, visits, optimize=True)
         taken = np.einsum("nip,niq->pq", white, white, optimize=True)
-        return estimate.covariance + spread - taken + together.T @ together
+        return estimate.covariance + spread - taken + together.T @ together + self._by_sizes()
+
+    def _by_sizes(self) -> np.ndarray:
+        """What adds to the covariance (p, p) of the estimate because the prior's sizes were estimated; nothing where they were not."""
+        estimate, task = self.estimate, self.task
+        names = estimate.parameters.names
+        kinds = {name: kind for name, kind in self.fit.kinds.items() if name in task.kept}
+        if not kinds:
+            return np.zeros((len(names), len(names)))
+        slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
+        rows = np.repeat(self.inliers, 3)
+        own = (task.columns(self.at, names) * slopes)[rows]
+        shift = estimate.parameters.coordinates() - estimate.parameters.prior_mean()
+        count = int(self.at.readings.present[self.inliers].sum())
+        return widening(
+            own.T @ own, task.prior_covariance[: len(names), : len(names)], shift, names, kinds, count
+        )
 
     def _gain(self, names: list[str]) -> np.ndarray:
         """Sensitivity (p, h) of the estimates to held parameters: -Σ Aᵀ A_h of the whitened columns."""

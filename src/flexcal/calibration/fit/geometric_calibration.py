@@ -155,6 +155,7 @@ def fit_geometry(
     secant_scale: float = 0.0,
     loss: Loss | LossName = "auto",
     fleet: FleetPrior | None = None,
+    kinds: Mapping[str, str] | None = None,
     near: Mapping[str, float] | None = None,
     frame: GeometricFit | None = None,
     tolerance: float = CONVERGED,
@@ -191,6 +192,9 @@ def fit_geometry(
         Loss function; "cauchy" finds outliers, "auto" takes it where squares leave some.
     fleet : FleetPrior, optional
         Prior of the geometry from other robots of the model.
+    kinds : mapping of str, optional
+        Kinds of the parameters whose tolerances in `model` have a factor in common that was estimated from these poses, by name: its
+        uncertainty is then part of the covariance (Kass and Steffey 1989).
     near : mapping of float, optional
         Values of parameters from which to start, as of a fit to nearly the same points; by default those of the `model`.
     frame : GeometricFit, optional
@@ -243,6 +247,7 @@ def fit_geometry(
         kept=() if frame is None else frame.identifiability.kept_names,
         progress=progress,
         fleet=fleet,
+        kinds=kinds,
     )
     choose = loss == "auto" and elasticity == "reestimated"
     if choose and fit.has_wrong_readings:

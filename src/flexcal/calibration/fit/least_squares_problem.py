@@ -49,6 +49,15 @@ class GeometryProblem:
             covariance += np.outer(common, common)
         return covariance
 
+    @property
+    def prior_covariance(self) -> np.ndarray:
+        """The same (p + e, p + e) with that of stiffness and inertia, in their coordinates, behind."""
+        size = len(self.kept) + len(self.prior.parameters)
+        covariance = np.zeros((size, size))
+        covariance[: len(self.kept), : len(self.kept)] = self.kept_covariance
+        covariance[len(self.kept) :, len(self.kept) :] = self.prior.covariance
+        return covariance
+
     def predicted(self, values: Mapping[str, float], *, jacobians: bool = False) -> PredictedMeasurements:
         """Predicted measurements of the robot with the given named values, on the flanks of this fit."""
         return self.predictions.at(values, self.flank, jacobians=jacobians)
@@ -77,10 +86,6 @@ class GeometryProblem:
             columns *= -parameters.natural_slope(x)
             return self.residual(at)[there], columns
 
-        size = len(parameters)
-        covariance = np.zeros((size, size))
-        covariance[: len(self.kept), : len(self.kept)] = self.kept_covariance
-        covariance[len(self.kept) :, len(self.kept) :] = self.prior.covariance
         groups = np.repeat(readings.row, 3)[there]
-        problem = Problem(parameters, linearise, None, covariance, groups)
+        problem = Problem(parameters, linearise, None, self.prior_covariance, groups)
         return solve(problem, loss=loss, tolerance=tolerance, progress=progress)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -73,7 +73,8 @@ class PointFit:
     """Input of a fit: the registered robot `start`, its `geometric` parameters, their rank on the `poses`, the elastic `prior`.
 
     `size` is the length that is held where no reading tells how large the robot is, `near` has values close to the solution, `far_zeros`
-    tells whether joint zeros are far off.
+    tells whether joint zeros are far off; `kinds` are those of the parameters whose tolerances have a factor in common that was estimated
+    from these poses.
     """
 
     start: RobotModel
@@ -90,6 +91,7 @@ class PointFit:
     far_zeros: bool
     progress: Progress
     fleet: FleetPrior | None = None
+    kinds: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -106,6 +108,7 @@ class PointFit:
         kept: Sequence[str] = (),
         progress: Progress,
         fleet: FleetPrior | None = None,
+        kinds: Mapping[str, str] | None = None,
     ) -> PointFit:
         """Input without the term `transmission` for fewer than 20 different poses, which do not determine its variance.
 
@@ -177,6 +180,7 @@ class PointFit:
             far_zeros,
             progress,
             fleet,
+            kinds or {},
         )
 
     @cached_property

@@ -10,6 +10,7 @@ import numpy as np
 
 from flexcal.calibration.error_model import SCATTER_SPREAD, USUAL_SCATTER
 from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
+from flexcal.calibration.fit.estimated_tolerances import FACTOR_SPREAD
 from flexcal.calibration.fit.point_fit import PointFit
 from flexcal.calibration.fit.terms import (
     common_lengths,
@@ -30,10 +31,8 @@ LENGTH_TOLERANCE = 5e-4
 """Standard deviation of manufacture, m, of a length before the measurements."""
 _SIZES = {"offset": 2e-3, "rad": 1e-3, "m": LENGTH_TOLERANCE}
 """Standard deviations of manufacture before the measurements: of joint zeros, and of other angles and lengths of the joints."""
-_YIELD, _SOFTEST = 1e-3, 1e-4
+_YIELD, _SOFTEST = 1e-3, 5e-4
 """Rotation, rad, by which a joint yields under its largest load, and the largest compliance, rad/(N m), before the measurements."""
-_SCALE = np.log(2.0)
-"""Standard deviation of the logarithm of the factor by which the errors of a kind are larger than these."""
 _LEAST = 3.0
 """Logarithm of the factor by which the scatter may be smaller than usual."""
 _SURELY, _UNSEEN = 30.0, 1e-9
@@ -60,8 +59,11 @@ _RELEASED = 6
 """Largest number of parameters with a standard deviation of their own."""
 
 
-def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> RobotModel | None:
-    """Robot whose errors of some terms have a prior about nominal: what robot.yaml declares, else tolerances of manufacture.
+def with_tolerance_prior(
+    model: RobotModel, poses: PoseSet, terms: Sequence[str]
+) -> tuple[RobotModel, dict[str, str]] | None:
+    """Robot whose errors of some terms have a prior about nominal: what robot.yaml declares, else tolerances of manufacture, and the
+    kinds of those parameters whose tolerances have a factor in common that was estimated here, by name.
 
     None where points tell all that any poses would so well that these change nothing, and where readings are beyond all numbers.
 
@@ -101,7 +103,8 @@ def with_tolerance_prior(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     if are_tracked(poses) and not fit.hidden and evidence.tells_all(factors, own):
         return None
     scaled = {name: size * factors.get(kinds[name], 1.0) for name, size in sizes.items()}
-    return model.with_priors(scaled | own)
+    shared = {name: kind for name, kind in kinds.items() if kind and name not in own}
+    return model.with_priors(scaled | own), shared
 
 
 def are_tracked(poses: PoseSet) -> bool:
@@ -350,5 +353,5 @@ class _Evidence:
         ]
         last = along @ mean - square - told.sum() + self.count
         last += 2 * scatter / (1 + scatter**2) / SCATTER_SPREAD
-        slope = np.append(np.array(gradient) + x[:-1] / _SCALE**2, last)
-        return float(cost + 0.5 * np.sum((x[:-1] / _SCALE) ** 2) + np.log1p(scatter**2)), slope
+        slope = np.append(np.array(gradient) + x[:-1] / FACTOR_SPREAD**2, last)
+        return float(cost + 0.5 * np.sum((x[:-1] / FACTOR_SPREAD) ** 2) + np.log1p(scatter**2)), slope

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -59,7 +59,8 @@ class FitSettings:
 class Fits:
     """The `rigid` fit and the one of the `selected` terms, of a `model` with the bearing axes and the backlash that they have.
 
-    `terms` are those asked for or selected, of which few poses may not support all.
+    `terms` are those asked for or selected, of which few poses may not support all; `kinds` those of the parameters whose tolerances have
+    a factor in common that was estimated from the poses.
     """
 
     model: RobotModel
@@ -68,6 +69,7 @@ class Fits:
     bearings: BearingAxes | None
     selection: TermSelection | None
     selected: GeometricFit
+    kinds: Mapping[str, str]
 
     @classmethod
     def of(
@@ -96,7 +98,9 @@ class Fits:
             and any(n.endswith(_YIELDING) for n in geometric_parameters(model, poses, (_YIELDING,)).names)
             else ()
         )
-        model = informed or model
+        kinds = {} if near is None else near.kinds
+        if informed is not None:
+            model, kinds = informed
 
         def fit(
             robot: RobotModel,
@@ -117,6 +121,7 @@ class Fits:
                 secant_scale=settings.secant_scale,
                 loss=loss,
                 fleet=settings.fleet,
+                kinds=kinds,
                 near=None if start is None else start.estimate.values,
                 frame=frame,
                 tolerance=CONVERGED if near is None else _COMPARED,
@@ -145,7 +150,7 @@ class Fits:
                 if same
                 else fit(model, terms, "selected fit", start, elastic=elastic, frame=of_selected)
             )
-            return cls(model, terms, rigid, bearings, None, selected)
+            return cls(model, terms, rigid, bearings, None, selected, kinds)
         good = poses.subset(np.setdiff1d(np.flatnonzero(~poses.tilted), rigid.estimate.outliers))
         for name, told in outlying_stations(poses, rigid.estimate.outliers).items():
             if np.sum(good.station == name) < LEAST_REGISTERED:
@@ -171,7 +176,8 @@ class Fits:
                 return chosen, fit_of(chosen)
 
         selection, selected = choose(model, rigid)
-        return cls(selection.model, _with_random_waves(selection), rigid, bearings, selection, selected)
+        found = _with_random_waves(selection)
+        return cls(selection.model, found, rigid, bearings, selection, selected, kinds)
 
     def again(self, poses: PoseSet, settings: FitSettings) -> GeometricFit:
         """Fit of the same terms, with the same priors, to some of the poses; without backlash where these are on one flank of it."""
@@ -183,8 +189,10 @@ class Fits:
             return Fits.of(self.model, poses, replace(same, terms=terms), near=self).selected
 
 
-def _with_tolerances(model: RobotModel, poses: PoseSet, settings: FitSettings) -> RobotModel | None:
-    """Robot with tolerances of manufacture as prior, where readings say where a target was and no other robots are known."""
+def _with_tolerances(
+    model: RobotModel, poses: PoseSet, settings: FitSettings
+) -> tuple[RobotModel, dict[str, str]] | None:
+    """`with_tolerance_prior`, where readings say where a target was and no other robots are known."""
     if not settings.tolerances or settings.fleet is not None or not len(poses.pointed):
         return None
     return with_tolerance_prior(model, poses, settings.terms or (*_base(model), _YIELDING))
