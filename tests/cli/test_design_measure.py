@@ -74,6 +74,10 @@ def test_designed_poses_are_where_the_instrument_reads(cell: tuple, name: str) -
     )
     assert document["tool_error_mm"] >= document["least_possible_mm"]
     assert (document["unseen_mm"] > 0.05) == (name in ("table", "ball", "edge", "fixture"))
+    # of points that place and size a rigid body by least squares
+    alone = 2e-5 / np.sqrt(((at - at.mean(axis=0)) ** 2).sum())
+    bounds = {"pose": (alone, 1.5 * alone), "rope": (alone, 1e-4)}.get(name, (2e-4, 2e-3))
+    assert bounds[0] < document["size"]["std"] < bounds[1]
 
 
 def test_the_command_line_says_what_a_tracker_would_reach(cell: tuple, tmp_path: Path, run) -> None:

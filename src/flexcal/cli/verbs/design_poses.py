@@ -184,9 +184,10 @@ class DesignPoses:
             unseen, tracked = document["unseen_mm"], document["with_tracker_mm"]
             if unseen > _UNSEEN * document["tool_error_mm"]:
                 console.say(
-                    f"besides, {unseen:.3f} mm are what these readings cannot tell, as how large the robot is, from typical tolerances and "
-                    "the stated accuracy of board, wire or sockets"
+                    f"besides, {unseen:.3f} mm are what these readings cannot tell, from typical tolerances and the stated accuracy of "
+                    "board, wire or sockets"
                 )
+            console.say(f"how large the robot is: {document['size']['sentence']}")
             console.say(f"with a tracker of points and as many poses: {tracked:.4f} mm")
             console.say(zeros_line(document["zeros"], document["instrument"]))
         others = {name: value for name, value in document["criteria"].items() if name != "c"}

@@ -45,8 +45,9 @@ class PoseCandidates:
     `base` holds the rows of all poses of the `pool`; `tool_motions` (W, 3, rank), m, are those of the tool at the working poses, and
     `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over them. `hidden` are the numbers of a
     given pool's poses that the instrument does not see; `unseen`, m, is the root mean square of the tool error due to what no pose tells,
-    as the size of the robot at contacts, by the tolerances. With `fleet`, a prior from other robots of the model, the parameters are those
-    that a calibration with it estimates.
+    as the size of the robot at contacts, by the tolerances. `size` (rank + 1,) is the relative change of all lengths in common with the
+    parameters and, the last, the standard deviation of what no pose tells of it. With `fleet`, a prior from other robots of the model, the
+    parameters are those that a calibration with it estimates.
 
     The pool may be what is left of `looked_at` candidates (None: of no more than these): its first `sample` poses are then a random sample
     of them, `start` the numbers of a good set, and `bound` with `largest` holds for all of them.
@@ -59,6 +60,7 @@ class PoseCandidates:
     tool_motions: np.ndarray
     tool_error_weight: np.ndarray
     hidden: np.ndarray
+    size: np.ndarray
     unseen: float = 0.0
     looked_at: int | None = None
     sample: int | None = None
@@ -137,11 +139,16 @@ def pose_candidates(
         if fleet is None
         else fleet_jacobian(model, working, setup, full.parameters.names)
     )
-    motions = base.columns(rows)
-    unseen = unseen_error(base, rows, full.parameters.prior_std())
-    return PoseCandidates(
-        model, setup, pool, base, motions, tool_error_weight(motions), hidden, unseen, fleet=fleet
+    motions, left = base.columns(rows), unseen_motions(base, rows, full.parameters.prior_std())
+    place = point_kinematics(model, working, point=setup.point, jacobians=False).position
+    place -= place.mean(axis=0)
+    larger = place / (place**2).sum()
+    size = np.append(
+        np.einsum("wi,wik->k", larger, motions), np.linalg.norm(np.einsum("wi,wip->p", larger, left))
     )
+    unseen = float(np.sqrt((left**2).sum() / len(left)))
+    weight = tool_error_weight(motions)
+    return PoseCandidates(model, setup, pool, base, motions, weight, hidden, size, unseen, fleet=fleet)
 
 
 def drawn_configurations(
@@ -231,14 +238,13 @@ def tool_error_weight(motions: np.ndarray) -> np.ndarray:
     return rows.T @ rows / len(motions)
 
 
-def unseen_error(base: BaseSensitivity, motions: np.ndarray, tolerance: np.ndarray) -> float:
-    """Root mean square tool error, m, of the directions that no candidate sees, conditional on the combinations that are seen."""
+def unseen_motions(base: BaseSensitivity, motions: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
+    """Motions (W, 3, p), m, of the tool in the directions that no candidate sees, conditional on the combinations that are seen."""
     regrouping = base.identifiability.regrouping * tolerance
     # the prior, in units of the tolerances, without the span of the seen combinations
     basis = np.linalg.qr(regrouping.T)[0]
-    rows = (motions * tolerance).reshape(-1, motions.shape[2])
-    left = rows - (rows @ basis) @ basis.T
-    return float(np.sqrt((left**2).sum() / len(motions)))
+    rows = motions * tolerance
+    return rows - (rows @ basis) @ basis.T
 
 
 def _wherever_the_base_is(

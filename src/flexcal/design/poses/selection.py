@@ -42,9 +42,9 @@ class PoseDesign:
     `tool_motions` (W, 3, rank), m, are those of the tool at the working poses, `tool_error_weight` (rank, rank), m², turns a covariance
     into the mean square of the tool error over them; `fewest` is the least number of poses that determine what no prior tells; `flank`
     (N, joints with backlash) is the sign of the gravity torque at `flank_joints`; `hidden` are the numbers of given poses that the
-    instrument does not see; `unseen`, m, is the tool error due to what no pose tells; `least_possible`, m, is a lower bound of the tool
-    error for any choice of as many candidates. The candidates may be what is left of `looked_at` ones; their first `sample` are then
-    random.
+    instrument does not see; `unseen`, m, is the tool error due to what no pose tells, `size` (rank + 1,) as of the candidates;
+    `least_possible`, m, is a lower bound of the tool error for any choice of as many candidates. The candidates may be what is left of
+    `looked_at` ones; their first `sample` are then random.
     """
 
     plan: PosePlan
@@ -58,6 +58,7 @@ class PoseDesign:
     flank: np.ndarray
     hidden: np.ndarray
     unseen: float
+    size: np.ndarray
     least_possible: float
     looked_at: int
     sample: int
@@ -82,6 +83,7 @@ class PoseDesign:
             flank=np.sign(gravity_torque(candidates.model, chosen, candidates.setup.payload))[:, loose],
             hidden=candidates.hidden,
             unseen=candidates.unseen,
+            size=candidates.size,
             least_possible=float(candidates.least_errors(np.array([len(chosen)]))[0]),
             looked_at=candidates.looked_at or len(candidates.pool),
             sample=candidates.sample or len(candidates.pool),
@@ -129,6 +131,12 @@ class PoseDesign:
             return float(distance_probability(np.full(len(variances), distance), variances).mean()) - 0.9
 
         return float(root_scalar(excess, bracket=(0.0, largest)).root)
+
+    @property
+    def size_std(self) -> float:
+        """Relative standard deviation of all lengths of the calibrated robot in common, by the tolerances where no pose tells them."""
+        factor = self.base.sensitivity.factor(self.selection.chosen)
+        return float(np.hypot(np.linalg.norm(np.linalg.solve(factor.T, self.size[:-1])), self.size[-1]))
 
     @property
     def criteria(self) -> dict[CriterionName, float]:

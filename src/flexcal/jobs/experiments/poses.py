@@ -181,6 +181,10 @@ class DesignedPoses(PlottedResult):
                 "measure": self.measure,
                 "instrument": self.instrument,
                 "unseen_mm": design.unseen / MILLIMETRE,
+                "size": {
+                    "std": design.size_std,
+                    "sentence": f"all lengths of the robot will be known to ± {1e3 * design.size_std:.2g} ‰ (1σ) in common",
+                },
                 "with_tracker_mm": None if self.with_tracker is None else self.with_tracker / MILLIMETRE,
                 "zeros": self._zeros(),
                 "working": working_block(self.working),
