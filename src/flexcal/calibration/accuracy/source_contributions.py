@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.calibration.error_model import joint_rotation_jacobian
+from flexcal.calibration.error_model import angular_scatter, joint_rotation_jacobian
 from flexcal.calibration.measurement import (
     Propagation,
     covariance_root,
@@ -46,10 +46,10 @@ def error_sources(reach: Propagation, q: np.ndarray) -> dict[str, np.ndarray]:
     root = covariance_root(model, names)
     at = predict_measurements(model, PoseSet.unmeasured(q, reach.target, reach.station, 1.0), jacobians=True)
     roots = at.jacobian(names) @ root
-    turned = (joint_rotation_jacobian(at) ** 2).sum(axis=(1, 2))
+    turned = ((joint_rotation_jacobian(at) * angular_scatter(model)) ** 2).sum(axis=(1, 2))
     scatter = {
         HYSTERESIS: (unknown_sides(at) ** 2).sum(axis=(1, 2)),
-        REPEATABILITY: 3 * model.value("scatter.robot") ** 2 + model.value("scatter.angular") ** 2 * turned,
+        REPEATABILITY: 3 * model.value("scatter.robot") ** 2 + turned,
         MODEL_ERROR: np.full(size, 3 * model.value("scatter.model") ** 2),
     }
     variance = (roots**2).sum(axis=(1, 2)) + sum(scatter.values())

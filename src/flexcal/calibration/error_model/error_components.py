@@ -31,7 +31,8 @@ class ErrorComponents:
 
     `share`: the instrument's noise over the stated sigma, 0 where none is stated (the robot's then contains it); `robot` m, independent
     from measurement to measurement, `pose` m and `angular` rad at every revolute joint, common to the points of one visit to a pose:
-    repeatability; `orientation` rad, independent from measured orientation to orientation, the instrument's where none is stated;
+    repeatability, of which `joints` are ratios of each revolute joint's to `angular`, their root mean square, empty where all are alike;
+    `orientation` rad, independent from measured orientation to orientation, the instrument's where none is stated;
     `workspace`, `order` and `command` m: model error common to a cell of the workspace, to a stretch of the measuring
     order, and to all visits of one command; `transmission` rad, of a wave of order 1 of a joint's transmission error (`waves`). `views`,
     `sockets`, `lengths` and `contacts` m, in place of `robot`: of the readings of cameras, of balls in sockets, of wires and of touched
@@ -51,6 +52,7 @@ class ErrorComponents:
     sockets: float = 0.0
     lengths: float = 0.0
     contacts: float = 0.0
+    joints: tuple[float, ...] = ()
 
     @property
     def model(self) -> float:
@@ -67,8 +69,19 @@ class ErrorComponents:
             (self.orientation, before.orientation),
             *((getattr(self, name), getattr(before, name)) for name in OF_INSTRUMENTS),
         )
+        if len(self.joints) == len(before.joints):
+            angles += tuple(zip(self.turning, before.turning, strict=True))
         turned = all(abs(a - b) <= tolerance * (a + _SMALLEST_TURN) for a, b in angles)
         return bool(same) and turned and abs(self.share - before.share) <= tolerance
+
+    @property
+    def turning(self) -> tuple[float, ...]:
+        """Repeatability of each revolute joint, rad; empty where all are alike."""
+        return tuple(self.angular * ratio for ratio in self.joints)
+
+    def by_joints(self, turns: np.ndarray) -> np.ndarray:
+        """Columns (R, 3, r), m or rad, of the repeatability of the joints, from how they move the readings, `turns` (R, 3, r), per rad."""
+        return turns * (np.array(self.turning) if self.joints else self.angular)
 
     def independent(self, readings: Readings, turns: np.ndarray) -> np.ndarray:
         """Covariance (R, 3, 3), m² or rad², of instrument and repeatability at each of the `readings`.
@@ -77,7 +90,8 @@ class ErrorComponents:
         """
         diagonal = self._scattered(readings) + self.pose**2 * (readings.unit == METRES)
         own = self.share**2 * readings.blocks + diagonal[:, :, None] * np.eye(3)
-        return own + self.angular**2 * turns @ np.swapaxes(turns, 1, 2)
+        moved = self.by_joints(turns)
+        return own + moved @ np.swapaxes(moved, 1, 2)
 
     def _scattered(self, readings: Readings) -> np.ndarray:
         """Variances (R, 3) of what is independent from reading to reading besides what is stated; 1 where there is no reading."""
@@ -104,7 +118,7 @@ class ErrorComponents:
 
     def common(self, readings: Readings, turns: np.ndarray) -> np.ndarray:
         """Columns (R, 3, 3 + r) of the repeatability shared by the readings of a visit, each times a standard normal variable."""
-        return np.concatenate([self.pose * translations(readings), self.angular * turns], axis=2)
+        return np.concatenate([self.pose * translations(readings), self.by_joints(turns)], axis=2)
 
     def whitening(self, readings: Readings, turns: np.ndarray) -> Whitening:
         """Whitening by the total variance of single readings, and what is stated of a point with its orientation."""
@@ -125,8 +139,8 @@ class ErrorComponents:
         What is taken for it may be an error of the model, and weights that follow it would fit the points of short levers only.
         """
         own = turns[~readings.points]
-        turned = float(np.mean((own**2).sum(axis=2))) if own.size else 0.0
-        orientation = float(np.hypot(self.orientation, self.angular * np.sqrt(turned)))
+        turned = float(np.mean((self.by_joints(own) ** 2).sum(axis=2))) if own.size else 0.0
+        orientation = float(np.hypot(self.orientation, np.sqrt(turned)))
         moved = turns[readings.unit == METRES]
         even = {name: self.evenly(moved, name) for name in (ROBOT, *readings.instruments)}
         return replace(self, pose=0.0, angular=0.0, orientation=orientation, **even).whitening(
@@ -137,8 +151,8 @@ class ErrorComponents:
         """Standard deviation of coordinates, m, that move by `turns` (K, r), m/rad, due to the robot's repeatability and the component
         `name`, root mean square.
         """
-        turned = float(np.mean((turns**2).sum(axis=1))) if turns.size else 0.0
-        return float(np.sqrt(getattr(self, name) ** 2 + self.pose**2 + self.angular**2 * turned))
+        turned = float(np.mean((self.by_joints(turns) ** 2).sum(axis=1))) if turns.size else 0.0
+        return float(np.sqrt(getattr(self, name) ** 2 + self.pose**2 + turned))
 
     def shared(self, cells: ErrorGroups, rows: np.ndarray) -> np.ndarray:
         """Sums (k, m) of `rows` (N, 3, m) over the points that share each coordinate of a model error, times its standard deviation."""
@@ -185,7 +199,19 @@ def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:
     if not stated:
         share = 1.0 if instrument > 0 else 0.0
     alone = np.sqrt(max(robot**2 - pose**2, 0.0))
-    return ErrorComponents(share=float(share), robot=float(alone), pose=float(pose), angular=float(angular))
+    return ErrorComponents(
+        share=float(share),
+        robot=float(alone),
+        pose=float(pose),
+        angular=float(angular),
+        joints=tuple((angular_scatter(model) / angular).tolist()) if model.scatter.joints.any() else (),
+    )
+
+
+def angular_scatter(model: RobotModel) -> np.ndarray:
+    """Calibrated repeatability (r,), rad, of the revolute joints with motors."""
+    own = [i for i in model.motors if model.joints[i].kind == "revolute"]
+    return model.scatter.turns(model.value("scatter.angular"))[own]
 
 
 def joint_rotation_jacobian(at: PredictedMeasurements) -> np.ndarray:

@@ -65,6 +65,11 @@ class PointSums:
             "pose": together @ np.swapaxes(together, 1, 2),
             "angular": turned @ np.swapaxes(turned, 1, 2),
         }
+        if cells.visits.shape[1] > 1:
+            structures |= {
+                name: turned[:, :, None, k] * turned[:, None, :, k]
+                for k, name in enumerate(joint_components(turned.shape[2]))
+            }
         least = ErrorComponents(share=0.0).jointly(fit.readings, fit.turns, cells)
         blocks, labels, count = {}, [], 0
         for name, own in cells.blocks.items():
@@ -87,11 +92,16 @@ class PointSums:
         """
         whole = self.least.copy()
         diagonal = np.einsum("gii->gi", whole)
+        turning = dict(zip(joint_components(len(scatter.joints)), scatter.turning, strict=True))
+        turning["angular"] = 0.0 if scatter.joints else scatter.angular
         for name, structure in self.structures.items():
+            std = turning.get(name, 0.0) if name in self.turning else getattr(scatter, name)
+            if not std:
+                continue
             if structure.ndim == 2:
-                diagonal += getattr(scatter, name) ** 2 * structure
+                diagonal += std**2 * structure
             else:
-                whole += getattr(scatter, name) ** 2 * structure
+                whole += std**2 * structure
         if commands and self.commands is not None:
             diagonal += scatter.command**2 * self.commands.once
         return whole
@@ -134,6 +144,11 @@ class PointSums:
         return half @ np.swapaxes(self.columns, 1, 2) + by_visits(entries, coordinates // 3)
 
     @property
+    def turning(self) -> tuple[str, ...]:
+        """Names of the components of rotations of the joints: of all alike, and of each."""
+        return "angular", *joint_components(self.fit.turns.shape[2])
+
+    @property
     def count(self) -> int:
         """Number of cells and stretches."""
         return sum(len(own) for own in self.blocks.values())
@@ -153,3 +168,8 @@ class PointSums:
             return self.fixed + np.arange(self.fit.waves.shape[2])
         first = self.columns.shape[2] + 3 * self.blocks[name]
         return (first[:, None] + np.arange(3)).ravel()
+
+
+def joint_components(count: int) -> tuple[str, ...]:
+    """Names of the components of single joints."""
+    return tuple(f"joint {k}" for k in range(count))

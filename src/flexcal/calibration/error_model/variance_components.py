@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from flexcal.calibration.error_model.error_components import ErrorComponents
 from flexcal.calibration.error_model.groups import ErrorGroups
-from flexcal.calibration.error_model.point_sums import PointSums
+from flexcal.calibration.error_model.point_sums import PointSums, joint_components
 from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
 from flexcal.calibration.measurement import METRES, OF_INSTRUMENTS, RADIANS, ROBOT, Readings
 
@@ -179,7 +180,33 @@ class LinearFit:
         negligible[0] &= self._tells_scatter
         seen = self._without(best, negligible, share)
         components = ErrorComponents(share=share, **{name: stds[name] for name in seen.names})
+        if self._several and components.angular > 0 and self.turns.shape[2] > 1:
+            return self._by_joints(seen, share)
         return components, _uncertainties(seen)
+
+    def _by_joints(self, best: _Maximum, share: float) -> tuple[ErrorComponents, dict[str, float]]:
+        """Components with a repeatability of each joint, which the points of one visit tell apart, and their standard deviations.
+
+        Beforehand each is as large as that of all joints within a factor, whose logarithm is Cauchy distributed.
+        """
+        whole = best.names.index("angular")
+        joints = joint_components(self.turns.shape[2])
+        rest = [name for name in best.names if name != "angular"]
+        common = float(best.variances[whole])
+        sizes = np.append(np.delete(best.scale, whole), np.full(len(joints), best.scale[whole]))
+        start = np.append(np.delete(best.relative, whole), np.full(len(joints), best.relative[whole]))
+        found = self._maximum([*rest, *joints], sizes, share, start, around=dict.fromkeys(joints, common))
+        stds = dict(zip(found.names, np.sqrt(found.variances).tolist(), strict=True))
+        turning = np.array([stds.pop(name) for name in joints])
+        angular = float(np.sqrt(np.mean(turning**2)))
+        components = ErrorComponents(
+            share=share, angular=angular, joints=tuple((turning / angular).tolist()), **stds
+        )
+        spread = _uncertainties(found)
+        spread["angular"] = float(
+            np.linalg.norm(turning * [spread[name] for name in joints]) / (len(joints) * angular)
+        )
+        return components, spread
 
     def _supported(self, best: _Maximum, share: float) -> _Maximum:
         """Model error, and the components of repeatability supported by the data, by backward elimination with a likelihood-ratio test.
@@ -268,12 +295,13 @@ class LinearFit:
         *,
         favour: bool = True,
         still: float = _STILL,
+        around: Mapping[str, float] | None = None,
     ) -> _Maximum:
         """Maximum of the restricted likelihood; `share` None: it is the last of the variances.
 
         Newton's steps with the average information, cut at the bounds. `near` (k,) is where to begin, in units of `scale`. The
         likelihood is multiplied by each standard deviation to the power of `_favour`, unless not to `favour` any. It has converged when
-        the deviance changes by less than `still`, by its slope.
+        the deviance changes by less than `still`, by its slope. Components `around` a variance have the prior of `SCATTER_SPREAD` there.
         """
         start = np.full(len(names), 0.7 / len(names)) if near is None else near.copy()
         largest = np.full(len(names), _LARGEST)
@@ -287,6 +315,9 @@ class LinearFit:
         known, usual = np.zeros(len(names)), np.ones(len(names))
         if not self._tells_scatter and names[0] in USUAL_SCATTER:
             known[0], usual[0] = 0.25 / SCATTER_SPREAD**2, USUAL_SCATTER[names[0]] ** 2 / scale[0]
+        for k, name in enumerate(names):
+            if around is not None and name in around:
+                known[k], usual[k] = 0.25 / SCATTER_SPREAD**2, around[name] / scale[k]
 
         def deviance(x: np.ndarray, at: RestrictedLikelihood) -> float:
             of_prior = 2 * float(np.log1p(known * np.log(x / usual) ** 2).sum())
@@ -321,9 +352,11 @@ class LinearFit:
         known = dict(zip(names, variances.tolist(), strict=True))
         squared = known.get("share", 0.0) if share is None else share**2
         stds = {name: float(np.sqrt(value)) for name, value in known.items() if name != "share"}
-        return RestrictedLikelihood.of(
-            self._sums, names, ErrorComponents(share=float(np.sqrt(squared)), **stds)
-        )
+        turning = [stds.pop(name) for name in joint_components(self.turns.shape[2]) if name in stds]
+        if turning:
+            stds["angular"] = 1.0
+        scatter = ErrorComponents(share=float(np.sqrt(squared)), joints=tuple(turning), **stds)
+        return RestrictedLikelihood.of(self._sums, names, scatter)
 
 
 def _certain(best: _Maximum) -> set[str]:

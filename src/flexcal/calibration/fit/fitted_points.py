@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexcal.calibration.error_model import LARGEST_WAVE, ErrorComponents, LinearFit, joint_rotation_jacobian
+from flexcal.calibration.error_model import (
+    LARGEST_WAVE,
+    ErrorComponents,
+    LinearFit,
+    joint_components,
+    joint_rotation_jacobian,
+)
 from flexcal.calibration.fit.estimated_tolerances import widening
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem
 from flexcal.calibration.fit.practical_identifiability import Undetermined, cause_of, undetermined
@@ -122,8 +128,9 @@ class FittedPoints:
         readings = self.at.readings
         groups = {n: readings.of_scatter(n).any(axis=1) for n in (ROBOT, *readings.instruments)}
         groups["orientation"] = ~readings.points
-        found = {n: float(np.sqrt(np.median(squares[g]) * spread)) for n, g in groups.items() if g.any()}
-        return ErrorComponents(**{"share": 0.0, ROBOT: 0.0, **found})
+        found: dict[str, Any] = {"share": 0.0, ROBOT: 0.0}
+        found |= {n: float(np.sqrt(np.median(squares[g]) * spread)) for n, g in groups.items() if g.any()}
+        return ErrorComponents(**found)
 
     def undetermined(self, scatter: ErrorComponents) -> tuple[Undetermined, ...]:
         """Parameters that the poses do not determine under a given scatter."""
@@ -327,7 +334,14 @@ class FittedPoints:
             Parameter(f"scatter.{key}", unit_of(f"scatter.{key}"), float(value), lower=0.0)
             for key, value in zip(SCATTER[:count], values, strict=False)
         )
-        return Parameters(items), known[:count]
+        known = known[:count]
+        if scatter.joints:
+            own = [joint.name for joint in self.model.motor_joints if joint.kind == "revolute"]
+            names = [f"scatter.{name}.angular" for name in own]
+            turning = zip(names, scatter.turning, strict=True)
+            items = (*items, *(Parameter(n, unit_of(n), float(value), lower=0.0) for n, value in turning))
+            known = np.append(known, [self.spread.get(name, 0.0) for name in joint_components(len(own))])
+        return Parameters(items), known
 
     def _together(self, *names: str) -> tuple[float, float]:
         """Root sum of squares of components of the scatter, and its standard deviation."""

@@ -158,10 +158,10 @@ class Propagation:
     def _scatter(self, by_geometry: np.ndarray) -> list[np.ndarray]:
         """Columns (N, 3, k) m of the errors besides the parameters: repeatability and model error."""
         model, columns = self.model, []
-        angular = model.value("scatter.angular")
-        if angular > 0:
-            revolute = [6 * i for i in model.motors if model.joints[i].kind == "revolute"]
-            columns.append(angular * by_geometry[:, :, revolute])
+        angular = model.scatter.turns(model.value("scatter.angular"))
+        if angular.any():
+            revolute = [i for i in model.motors if model.joints[i].kind == "revolute"]
+            columns.append(angular[revolute] * by_geometry[:, :, [6 * i for i in revolute]])
         lag = lag_rms(model)
         if lag.any():
             columns.append(by_geometry[:, :, [6 * i for i in np.flatnonzero(lag)]] * lag[lag > 0])

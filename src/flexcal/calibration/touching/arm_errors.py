@@ -160,10 +160,11 @@ def _scatter(prediction: PredictedMeasurements) -> np.ndarray:
     model, count = prediction.model, len(prediction.position)
     size = model.value("scatter.robot") ** 2 + model.value("scatter.model") ** 2
     single = np.broadcast_to(size * np.eye(3), (count, 3, 3)).copy()
-    angular = model.value("scatter.angular")
-    if angular > 0:
-        offsets = [f"{joint.name}.offset" for joint in model.joints if joint.kind == "revolute"]
-        turns = angular * prediction.jacobian(offsets)
+    angular = model.scatter.turns(model.value("scatter.angular"))
+    if angular.any():
+        revolute = [i for i, joint in enumerate(model.joints) if joint.kind == "revolute"]
+        offsets = [f"{model.joints[i].name}.offset" for i in revolute]
+        turns = prediction.jacobian(offsets) * angular[revolute]
         single += turns @ turns.swapaxes(1, 2)
     whole = np.zeros((3 * count, 3 * count))
     for k in range(count):

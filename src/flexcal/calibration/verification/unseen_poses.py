@@ -202,8 +202,13 @@ def _freedom(model: RobotModel, at: PredictedMeasurements, poses: PoseSet, predi
         "scatter.robot": rows,
         "scatter.model": rows,
         "scatter.instrument_share": float(np.sum(poses.sigma**2)) if poses.sigma_given else 0.0,
-        "scatter.angular": float(np.sum(joint_rotation_jacobian(at) ** 2)),
     }
+    turned = np.sum(joint_rotation_jacobian(at) ** 2, axis=(0, 1))
+    if model.scatter.joints.any():
+        own = [joint.name for joint in model.motor_joints if joint.kind == "revolute"]
+        weights |= {f"scatter.{name}.angular": float(size) for name, size in zip(own, turned, strict=True)}
+    else:
+        weights["scatter.angular"] = float(turned.sum())
     seen = [name for name in weights if known.determines(name)]
     spread = [2 * model.value(n) * weights[n] * float(np.sqrt(known.marginal([n])[0, 0])) for n in seen]
     variance = float(np.sum(np.square(spread)))

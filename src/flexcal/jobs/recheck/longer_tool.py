@@ -255,14 +255,19 @@ def found_in_words(limits: Sequence[DetectionLimit]) -> str:
 
 
 def _scattering_joints(model: RobotModel, candidates: PoseSet) -> RobotModel:
-    """Robot whose scatter of points, as calibrated, is one of all revolute joints alike, as large at the candidates."""
+    """Robot whose scatter of points, as calibrated, is one of the revolute joints, as large at the candidates."""
     names = [f"{joint.name}.offset" for joint in model.motor_joints if joint.kind != "prismatic"]
     at = predict_measurements(model, candidates, jacobians=True)
     lever = float(np.sqrt(np.mean(np.sum(at.jacobian(names) ** 2, axis=2)))) if names else 0.0
     if not lever:
         return model
-    angular = float(np.hypot(model.value("scatter.angular"), model.value("scatter.robot") / lever))
-    return model.with_values({"scatter.robot": 0.0, "scatter.angular": angular})
+    told = model.scatter.joints > 0
+    own = [
+        f"scatter.{joint.name}.angular" for joint, is_told in zip(model.joints, told, strict=True) if is_told
+    ]
+    more = model.value("scatter.robot") / lever
+    angular = {name: float(np.hypot(model.value(name), more)) for name in ("scatter.angular", *own)}
+    return model.with_values({"scatter.robot": 0.0, **angular})
 
 
 def _with_place(model: RobotModel, name: str, place: np.ndarray) -> RobotModel:

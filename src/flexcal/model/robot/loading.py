@@ -94,7 +94,7 @@ def read_robot(robot_type: type[RobotModel], file: YamlFile) -> RobotModel:
         stations=Stations.at_base(
             stations, [name for name, item in config.measurements.items() if item.kind == "sockets"]
         ),
-        scatter=Scatter(np.zeros(len(SCATTER))),
+        scatter=Scatter(np.zeros(len(SCATTER)), np.zeros(n)),
         thermal=Thermal.at_reference(n, config.geometry.reference_temperature),
         payload=payload,
         force_sensor=_force_sensor(file, description, config),

@@ -143,9 +143,17 @@ class Stations:
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """Scatter of measured points: `std` (8,) of its causes in the order of `SCATTER`, m and rad; `instrument_share` is a ratio."""
+    """Scatter of measured points: `std` (8,) of its causes in the order of `SCATTER`, m and rad; `instrument_share` is a ratio.
+
+    `joints` (n,), rad, where points of one pose told the joints apart, whose root mean square `angular` then is; zero where not.
+    """
 
     std: np.ndarray
+    joints: np.ndarray
+
+    def turns(self, angular: float) -> np.ndarray:
+        """Scatter (n,) of each joint, rad: its own, or that of all."""
+        return np.where(self.joints > 0, self.joints, angular)
 
 
 @dataclass(frozen=True, eq=False)

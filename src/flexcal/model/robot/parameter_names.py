@@ -250,4 +250,6 @@ def parameter_locations(model: RobotModel) -> dict[str, Location]:
             table[f"point.{name}.zero_{key}"] = Location("geometry", "point_zero", (p, k))
     for k, key in enumerate(SCATTER):
         table[f"scatter.{key}"] = Location("scatter", "std", (k,))
+    for i, joint in enumerate(model.joints):
+        table[f"scatter.{joint.name}.angular"] = Location("scatter", "joints", (i,))
     return table

@@ -133,7 +133,9 @@ def _sentence(results: Mapping[str, Any]) -> str:
             else f" To be calibrated with the prior of {len(prior['robots'])} other robots, {prior['file']}: {prior['sentence']}."
         )
         size = (
-            "" if results.get("measure") is None else f" How large the robot is: {results['size']['sentence']}."
+            ""
+            if results.get("measure") is None
+            else f" How large the robot is: {results['size']['sentence']}."
         )
         return (
             f"Measured with {results['instrument']}, they predict a tool error of {significant(results['tool_error_mm'], 3)} mm from its "
