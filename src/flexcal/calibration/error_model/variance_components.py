@@ -127,13 +127,14 @@ class LinearFit:
 
         Where a sigma is `stated`, the instrument's part is that, or less where the points scatter clearly less than it says.
         """
-        shared = [*([TRANSMISSION] if self.waves.size else []), *self.cells.blocks]
+        # few readings tell no kinds of scatter apart
+        blocks = list(self.cells.blocks) if self._tells_scatter else []
+        shared = [*([TRANSMISSION] if self.waves.size else []), *blocks]
         totals = self._mean_squares()
         # inclinometers alone have no reading in metres
         unit, first = (METRES, ROBOT) if ROBOT in totals else (RADIANS, ORIENTATION)
         own = [*self.readings.instruments]
         own += [ORIENTATION] if ORIENTATION in totals and first != ORIENTATION else []
-        # few readings tell no kinds of scatter apart
         kinds = [*(["pose"] if self._several else []), "angular"] if self._tells_scatter else []
         names = [first, *own, *kinds, *shared]
         levers = {

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.accuracy import predicted_rms, random_poses_in
-from flexcal.calibration.fit import GeometricFit
+from flexcal.calibration.fit import GeometricFit, are_tracked
 from flexcal.calibration.measurement import propagation
 from flexcal.errors import FlexcalError
 from flexcal.jobs.calibration.joint_ranges import joint_extents
 from flexcal.jobs.inputs import PREDICTED
-from flexcal.model.kinematics import joint_ranges, point_kinematics
+from flexcal.model.kinematics import joint_ranges, point_kinematics, rigid_motion_columns
 from flexcal.model.robot import RobotModel
+from flexcal.model.statics import tool_at_rest
 from flexcal.report.checks import BEYOND
 from flexcal.report.layout import listed
 from flexcal.units import MILLIMETRE
@@ -32,7 +33,8 @@ class Extent:
     one, the joints' ranges.
 
     `ranges` of the joints at the poses, of those that moved through a part of their range only; `box` (2, 3), m, base frame, around the
-    points.
+    points. `corrected`, m, is what the calibration changes beyond (root mean square), base and point found; None where no instrument
+    measured points.
     """
 
     inside: float
@@ -40,6 +42,7 @@ class Extent:
     volume: bool
     ranges: Mapping[str, str]
     box: np.ndarray
+    corrected: float | None
 
     @classmethod
     def of(cls, fit: GeometricFit) -> Extent | None:
@@ -62,7 +65,8 @@ class Extent:
         points = point_kinematics(model, inside, point=target, jacobians=False).position
         around = np.array([points.min(axis=0), points.max(axis=0)])
         rms = [float(np.sqrt(np.mean(predicted_rms(reach, at) ** 2))) for at in (inside, q)]
-        return cls(rms[0], rms[1], box is not None, _partial_ranges(model, own), around)
+        corrected = _corrected(fit, q, target) if are_tracked(poses) else None
+        return cls(rms[0], rms[1], box is not None, _partial_ranges(model, own), around, corrected)
 
     @property
     def range_of_errors(self) -> dict[str, tuple[float, float]]:
@@ -74,6 +78,7 @@ class Extent:
         return {
             "inside_mm": self.inside / MILLIMETRE,
             "beyond_mm": self.beyond / MILLIMETRE,
+            "corrected_mm": None if self.corrected is None else self.corrected / MILLIMETRE,
             "of": "working volume" if self.volume else "joint ranges",
         }
 
@@ -93,6 +98,21 @@ class Extent:
             f"accurate only near these poses ({near}the point in {', '.join(sides)} m): predicted errors are {_mm(self.inside)} there and "
             f"{_mm(self.beyond)} over {where} (rms); calibrate on poses of where the robot works{otherwise}",
         )
+
+
+def _corrected(fit: GeometricFit, q: np.ndarray, target: str) -> float:
+    """Root mean square change, m, of points at poses `q` (N, n) by a fit, without what other places of base and point explain."""
+    parameters = fit.estimate.parameters
+    start = dict(zip(parameters.names, parameters.natural(parameters.prior_mean()).tolist(), strict=True))
+    nominal, calibrated = (
+        tool_at_rest(model, q, None, np.full(len(q), target)).kinematics
+        for model in (fit.model.with_values(start), fit.model)
+    )
+    moved = (calibrated.position - nominal.position).ravel()
+    gauge = np.concatenate([rigid_motion_columns(nominal.position), nominal.orientation], axis=2)
+    gauge = gauge.reshape(len(moved), -1)
+    moved -= gauge @ np.linalg.lstsq(gauge, moved, rcond=None)[0]
+    return float(np.linalg.norm(moved) / np.sqrt(len(q)))
 
 
 def _mm(size: float) -> str:

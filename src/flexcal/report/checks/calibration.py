@@ -62,7 +62,7 @@ def calibration_checks(
             if groups is None
             else [check_held_out(groups, errors.mean, share).named("groups_left_out", independent=True)]
         ),
-        *([] if left_out is None else check_gain(results["before"]["own"], left_out, results["fit"])),
+        *check_gain(results["before"]["own"], left_out, results["fit"], results.get("extent")),
         check_error_budget(
             estimate, results["variances"], is_implausible=results["fit"]["is_implausible"], held=held
         ),

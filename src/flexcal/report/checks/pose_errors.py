@@ -271,6 +271,8 @@ def check_truth(covered: int, total: int) -> Check:
     return Check(question, answer, "good" if share >= 0.88 else "care" if share >= 0.75 else "bad")
 
 
+_ALL = 0.95
+"""Predicted error, in that of the robot before, from which little is gained."""
 _FRESH = "Measure fresh poses and run flexcal verify before relying on it."
 
 
@@ -289,24 +291,36 @@ def check_left_out(
 
 
 def check_gain(
-    before: Mapping[str, float] | None, left_out: float, fit: Mapping[str, Any]
+    before: Mapping[str, float] | None,
+    left_out: float | None,
+    fit: Mapping[str, Any],
+    extent: Mapping[str, Any] | None,
 ) -> tuple[Check, ...]:
-    """Where poses left out of the fit are met no better (mean error `left_out`, m) than by the uncalibrated robot; `before` and `fit` are
-    of results.json.
+    """Where poses left out of the fit are met no better (mean error `left_out`, m) than by the uncalibrated robot, or the errors that are
+    left open are nearly all that there were; `before`, `fit` and `extent` are of results.json.
 
     Of the uncalibrated robot six numbers of the instrument and three of the point are fitted to the same poses, see `check_held_out`.
     """
-    if before is None:
+    question = "Is the robot more accurate than before?"
+    if before is not None and left_out is not None:
+        share = min(_PLACES / max(fit["coordinates"], 1), 0.9)
+        uncalibrated = before["mean_mm"] * MILLIMETRE * float(np.sqrt((1 + share) / (1 - share)))
+        if left_out >= uncalibrated:
+            answer = (
+                f"No: poses left out of the fit are met to {millimetres(left_out)} mm on average, and by the robot before, with its base "
+                f"and point found, to {millimetres(uncalibrated)} mm. Look for wrong readings, and measure more poses."
+            )
+            return (Check(question, answer, "care").named("gain"),)
+    if extent is None or extent["corrected_mm"] is None:
         return ()
-    share = min(_PLACES / max(fit["coordinates"], 1), 0.9)
-    uncalibrated = before["mean_mm"] * MILLIMETRE * float(np.sqrt((1 + share) / (1 - share)))
-    if left_out < uncalibrated:
+    open_, corrected = extent["beyond_mm"], extent["corrected_mm"]
+    if open_ < _ALL * np.hypot(open_, corrected):
         return ()
     answer = (
-        f"No: poses left out of the fit are met to {millimetres(left_out)} mm on average, and by the robot before, with its base and point "
-        f"found, to {millimetres(uncalibrated)} mm. Look for wrong readings, and measure more poses."
+        f"Hardly: over the {extent['of']} the calibration changes {document_millimetres(corrected)} mm and leaves "
+        f"{document_millimetres(open_)} mm open (rms). Measure more poses, or by a better instrument."
     )
-    return (Check("Is the robot more accurate than before?", answer, "care").named("gain"),)
+    return (Check(question, answer, "care").named("gain"),)
 
 
 def check_held_out(held_out: Mapping[str, Any], mean: float, share: float) -> Check:

@@ -163,7 +163,7 @@ PHRASES: dict[str, dict[str, str]] = {
         "good": "the rank is clear",
         "else": "it is not clear which parameters the poses determine",
     },
-    "gain": {"else": "poses left out of the fit are met no better than before the calibration"},
+    "gain": {"else": "the robot is hardly more accurate than before the calibration"},
     "extent": {
         "good": "predicted errors are about as small everywhere",
         "else": "it is accurate only near the calibrated poses",
