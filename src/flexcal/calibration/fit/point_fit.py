@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -216,7 +217,7 @@ class PointFit:
         """Initial error model: stated values, and typical ones of robots."""
         share = 1.0 if self.poses.sigma_given else 0.0
         orientation = _FIRST_ORIENTATION if self.poses.angled.any() else 0.0
-        own = dict.fromkeys((ROBOT, *Readings.of(self.poses).instruments), _FIRST_SCATTER)
+        own: dict[str, Any] = dict.fromkeys((ROBOT, *Readings.of(self.poses).instruments), _FIRST_SCATTER)
         return ErrorComponents(share=share, orientation=orientation, **own)
 
     @property
