@@ -55,7 +55,7 @@ def widening(
     before = np.where(known & known[:, None], prior, 0.0) / (unit * unit[:, None])
     precision = np.zeros_like(told)
     precision[own] = np.linalg.inv(before[own])
-    covariance = np.linalg.pinv(told + precision, hermitian=True)
+    covariance = _inverse(told + precision)
     left = covariance @ precision
     pulled = precision @ (shift / unit)
     # variance of the readings about the prior's mean, in that of their scatter: what falls on the columns
@@ -71,8 +71,18 @@ def widening(
     moved = 2 * covariance @ np.column_stack([precision @ (member * pulled).T, -pulled])
     larger = np.expm1(2 * np.diag(sizes))
     before[own] += np.diag(larger[:-1] @ member)[own]
-    precision[own] = np.linalg.inv(before[own])
-    wide = np.linalg.pinv(told / (1 + larger[-1]) + precision, hermitian=True)
+    less = precision.copy()
+    less[own] -= np.linalg.inv(before[own])
+    less += told * (larger[-1] / (1 + larger[-1]))
+    # what the covariance grows by where the information is less by that; the difference of both would be rounding
+    grown = covariance @ less @ _inverse(told + precision - less)
     # rounding where readings are nearly exact makes no variance negative
-    values, axes = np.linalg.eigh(wide - covariance + moved @ sizes @ moved.T)
+    values, axes = np.linalg.eigh((grown + grown.T) / 2 + moved @ sizes @ moved.T)
     return (axes * np.maximum(values, 0.0)) @ axes.T * unit * unit[:, None]
+
+
+def _inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse (p, p) of a positive semidefinite matrix whose rows differ in size; pseudo-inverse where it is singular."""
+    size = np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
+    size = size * size[:, None]
+    return np.linalg.pinv(matrix / size, hermitian=True) / size
