@@ -27,7 +27,7 @@ from flexcal.model.robot import (
 )
 from flexcal.model.statics import (
     carried_mass,
-    gravity_torque_by_geometry,
+    rotations_by_geometry,
     transmission_column,
     twist_by_hardening,
     twist_from_torque,
@@ -65,7 +65,7 @@ class ArmColumns:
         if twists:
             joints, moved = zip(*twists.values(), strict=True)
             twist = self.at.by_row(np.stack(moved, axis=1))[:, None]
-            result[:, :, run(list(twists))] = twist * self._by_geometry.take(6 * np.array(joints), axis=2)
+            result[:, :, run(list(twists))] = twist * self._under_load.take(6 * np.array(joints), axis=2)
         if loads:
             load = self.at.by_row(np.stack(list(loads.values()), axis=2))
             result[:, :, run(list(loads))] = np.matmul(self._by_load, load)
@@ -86,20 +86,28 @@ class ArmColumns:
         return -np.matmul(own, self.at.by_row(rest.compliance))
 
     @cached_property
-    def _by_geometry(self) -> np.ndarray:
-        """Readings (R, 3, G + 6) by the errors of `RobotModel.geometry_columns`, and six of the tool."""
+    def _under_load(self) -> np.ndarray:
+        """Readings (R, 3, G + 6) by the errors of `RobotModel.geometry_columns`, and six of the tool, at the load that joints have."""
         columns = self.at.moved(self.at.kinematics.geometry_jacobian)
         if self.at.rest.axes.size:
             coupling = self.at.by_row(self.at.rest.coupling)
             columns[:, :, : len(self.at.model.geometry_columns)] += np.matmul(self._by_load, coupling)
-        compliance = self.at.model.geometry.gravity_compliance
-        if yielding := np.flatnonzero(compliance).tolist():
-            # gravity turns joints by another torque where it has other levers
-            model, poses = self.at.model, self.at.poses
-            masses = carried_mass(model, poses.payload, len(poses))
-            slopes = gravity_torque_by_geometry(model, poses.q, yielding, masses)
-            turned = columns[:, :, [6 * joint for joint in yielding]] * compliance[yielding]
-            columns[:, :, : slopes.shape[2]] -= np.matmul(turned, self.at.by_row(slopes))
+        return columns
+
+    @cached_property
+    def _by_geometry(self) -> np.ndarray:
+        """The same with what the errors change of that load; a twist by transmission or backlash changes none."""
+        model, poses, columns = self.at.model, self.at.poses, self._under_load
+        axes, slopes = rotations_by_geometry(model, poses.q, carried_mass(model, poses.payload, len(poses)))
+        if not axes:
+            return columns
+        # a tilt changes no load on springs either
+        moved = [
+            columns[:, :, 6 * joint] if component == 2 else self._by_motion[:, :, joint, component]
+            for joint, component in axes
+        ]
+        columns = columns.copy()
+        columns[:, :, : slopes.shape[2]] += np.matmul(np.stack(moved, axis=2), self.at.by_row(slopes))
         return columns
 
     def _point(self, target: str, key: str) -> np.ndarray:

@@ -235,11 +235,35 @@ def gravity_regressor(
     return result
 
 
-def gravity_torque_by_geometry(
-    model: RobotModel, q: np.ndarray, joints: list[int], payload: np.ndarray | float | None = None
-) -> np.ndarray:
-    """Derivative (samples, len(joints), G) of `gravity_torque` of some joints by the errors of `RobotModel.geometry_columns`."""
-    return _held_rigidly(model, q, payload, [(joint, 2) for joint in joints], sensitivities=True)[3]
+def rotations_by_geometry(
+    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
+) -> tuple[list[tuple[int, int]], np.ndarray]:
+    """Joints and components, as of `elastic_axes`, that yield to gravity by their gravity or lateral compliance, and the derivative
+    (samples, k, G) of these rotations by the errors of `RobotModel.geometry_columns`, which change gravity's levers.
+    """
+    q, geometry = joint_batch(model, q), model.geometry
+    turning = np.flatnonzero(geometry.gravity_compliance).tolist()
+    leaning = np.flatnonzero(geometry.lateral_compliance.any(axis=1)).tolist()
+    axes = [*((joint, 2) for joint in turning), *((joint, c) for joint in leaning for c in (0, 1))]
+    if not axes:
+        return axes, np.zeros((len(q), 0, 0))
+    loads, _, _, slopes = _held_rigidly(model, q, payload, axes, sensitivities=True)
+    count = len(turning)
+    slopes[:, :count] *= -geometry.gravity_compliance[turning][:, None]
+    if leaning:
+        tilt, compliance = lateral_axes(model, q)[:, leaning], geometry.lateral_compliance[leaning]
+        moments = -loads[:, count:].reshape(len(q), -1, 2)
+        by_load = -np.einsum("ja,sjac,sjad->sjcd", compliance, tilt, tilt)
+        own = slopes[:, count:].reshape(len(q), len(leaning), 2, -1)
+        slopes[:, count:] = (by_load @ own).reshape(len(q), 2 * len(leaning), -1)
+        if model.bearings == "after":
+            # these axes turn with the joint
+            turned = np.stack([tilt[..., 1], -tilt[..., 0]], axis=-1)
+            across = np.einsum("ja,sjac,sjad->sjcd", compliance, turned, tilt)
+            change = -np.einsum("sjcd,sjd->sjc", across + across.swapaxes(2, 3), moments)
+            for k, joint in enumerate(leaning):
+                slopes[:, count + 2 * k : count + 2 * k + 2, 6 * joint] += change[:, k]
+    return axes, slopes
 
 
 def spring_loads(
