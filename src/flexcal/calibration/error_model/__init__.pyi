@@ -2,6 +2,7 @@ from .error_components import (
     ErrorComponents,
     angular_scatter,
     joint_rotation_jacobian,
+    joint_scatter,
     known_scatter,
     translations,
 )
@@ -29,6 +30,7 @@ __all__ = [
     "group_numbers",
     "joint_components",
     "joint_rotation_jacobian",
+    "joint_scatter",
     "known_scatter",
     "occurrence",
     "order_folds",

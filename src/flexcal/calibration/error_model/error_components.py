@@ -214,6 +214,11 @@ def angular_scatter(model: RobotModel) -> np.ndarray:
     return model.scatter.turns(model.value("scatter.angular"))[own]
 
 
+def joint_scatter(model: RobotModel) -> list[str]:
+    """Names of the repeatability of each of these joints."""
+    return [f"scatter.{joint.name}.angular" for joint in model.motor_joints if joint.kind == "revolute"]
+
+
 def joint_rotation_jacobian(at: PredictedMeasurements) -> np.ndarray:
     """Derivative (R, 3, r) of the readings with respect to a rotation of every revolute motor joint, per rad, in the instrument's frame."""
     joints = [joint for joint in at.model.motor_joints if joint.kind == "revolute"]

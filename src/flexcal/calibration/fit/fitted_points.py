@@ -14,6 +14,7 @@ from flexcal.calibration.error_model import (
     LinearFit,
     joint_components,
     joint_rotation_jacobian,
+    joint_scatter,
 )
 from flexcal.calibration.fit.estimated_tolerances import widening
 from flexcal.calibration.fit.least_squares_problem import GeometryProblem
@@ -259,23 +260,28 @@ class FittedPoints:
         visits = linear.cells.gathered(respond)
         spread = np.einsum("gip,gij,gjq->pq", visits, jointly, visits, optimize=True)
         taken = np.einsum("nip,niq->pq", white, white, optimize=True)
-        return estimate.covariance + spread - taken + together.T @ together + self._by_sizes()
+        return (
+            estimate.covariance
+            + spread
+            - taken
+            + together.T @ together
+            + self._by_sizes(own[np.repeat(self.inliers, 3)])
+        )
 
-    def _by_sizes(self) -> np.ndarray:
-        """What adds to the covariance (p, p) of the estimate because the prior's sizes were estimated; nothing where they were not."""
+    def _by_sizes(self, columns: np.ndarray) -> np.ndarray:
+        """What adds to the covariance (p, p) of the estimate because the prior's sizes were estimated; nothing where they were not.
+
+        `columns` (3 R, p) are the whitened ones of the readings that count.
+        """
         estimate, task = self.estimate, self.task
         names = estimate.parameters.names
         kinds = {name: kind for name, kind in self.fit.kinds.items() if name in task.kept}
         if not kinds:
             return np.zeros((len(names), len(names)))
-        slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
-        rows = np.repeat(self.inliers, 3)
-        own = (task.columns(self.at, names) * slopes)[rows]
         shift = estimate.parameters.coordinates() - estimate.parameters.prior_mean()
         count = int(self.at.readings.present[self.inliers].sum())
-        return widening(
-            own.T @ own, task.prior_covariance[: len(names), : len(names)], shift, names, kinds, count
-        )
+        prior = task.prior_covariance[: len(names), : len(names)]
+        return widening(columns.T @ columns, prior, shift, names, kinds, count)
 
     def _gain(self, names: list[str]) -> np.ndarray:
         """Sensitivity (p, h) of the estimates to held parameters: -Σ Aᵀ A_h of the whitened columns."""
@@ -336,11 +342,10 @@ class FittedPoints:
         )
         known = known[:count]
         if scatter.joints:
-            own = [joint.name for joint in self.model.motor_joints if joint.kind == "revolute"]
-            names = [f"scatter.{name}.angular" for name in own]
+            names = joint_scatter(self.model)
             turning = zip(names, scatter.turning, strict=True)
             items = (*items, *(Parameter(n, unit_of(n), float(value), lower=0.0) for n, value in turning))
-            known = np.append(known, [self.spread.get(name, 0.0) for name in joint_components(len(own))])
+            known = np.append(known, [self.spread.get(name, 0.0) for name in joint_components(len(names))])
         return Parameters(items), known
 
     def _together(self, *names: str) -> tuple[float, float]:

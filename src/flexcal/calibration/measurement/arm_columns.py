@@ -61,14 +61,14 @@ class ArmColumns:
             else:
                 loads[k] = self._load(name)
         if errors:
-            result[:, :, run(list(errors))] = self._by_geometry.take(list(errors.values()), axis=2)
+            result[:, :, as_slice(list(errors))] = self._by_geometry.take(list(errors.values()), axis=2)
         if twists:
             joints, moved = zip(*twists.values(), strict=True)
             twist = self.at.by_row(np.stack(moved, axis=1))[:, None]
-            result[:, :, run(list(twists))] = twist * self._under_load.take(6 * np.array(joints), axis=2)
+            result[:, :, as_slice(list(twists))] = twist * self._under_load.take(6 * np.array(joints), axis=2)
         if loads:
             load = self.at.by_row(np.stack(list(loads.values()), axis=2))
-            result[:, :, run(list(loads))] = np.matmul(self._by_load, load)
+            result[:, :, as_slice(list(loads))] = np.matmul(self._by_load, load)
         return result
 
     @cached_property
@@ -216,7 +216,7 @@ class ArmColumns:
         raise FlexcalError("E-CAL-013", f"the position of a point does not depend on '{name}'.")
 
 
-def run(places: list[int]) -> slice | list[int]:
+def as_slice(places: list[int]) -> slice | list[int]:
     """The same places as a slice where they follow each other, which copies several times as fast."""
     first, last = places[0], places[-1] + 1
     return slice(first, last) if places == list(range(first, last)) else places

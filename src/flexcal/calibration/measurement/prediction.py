@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.calibration.kinds import ANGULAR, KINDS, LOCATING, Kind
-from flexcal.calibration.measurement.arm_columns import ArmColumns, run
+from flexcal.calibration.measurement.arm_columns import ArmColumns, as_slice
 from flexcal.calibration.measurement.readings import Readings
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
@@ -178,7 +178,7 @@ class PredictedMeasurements:
             else:
                 result[:, :, k] = kind.column(self, name)
         if of_arm:
-            result[:, :, run(of_arm)] = ArmColumns(self).columns([names[k] for k in of_arm])
+            result[:, :, as_slice(of_arm)] = ArmColumns(self).columns([names[k] for k in of_arm])
         result.setflags(write=False)
         return result
 

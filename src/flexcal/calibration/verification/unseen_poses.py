@@ -12,6 +12,7 @@ from flexcal.calibration.error_model import (
     ErrorStatistics,
     block_columns,
     joint_rotation_jacobian,
+    joint_scatter,
     known_scatter,
 )
 from flexcal.calibration.measurement import (
@@ -205,8 +206,7 @@ def _freedom(model: RobotModel, at: PredictedMeasurements, poses: PoseSet, predi
     }
     turned = np.sum(joint_rotation_jacobian(at) ** 2, axis=(0, 1))
     if model.scatter.joints.any():
-        own = [joint.name for joint in model.motor_joints if joint.kind == "revolute"]
-        weights |= {f"scatter.{name}.angular": float(size) for name, size in zip(own, turned, strict=True)}
+        weights |= dict(zip(joint_scatter(model), turned.tolist(), strict=True))
     else:
         weights["scatter.angular"] = float(turned.sum())
     seen = [name for name in weights if known.determines(name)]

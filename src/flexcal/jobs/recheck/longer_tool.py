@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.calibration.error_model import joint_scatter
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.calibration.recheck import (
     DetectionLimit,
@@ -261,10 +262,7 @@ def _scattering_joints(model: RobotModel, candidates: PoseSet) -> RobotModel:
     lever = float(np.sqrt(np.mean(np.sum(at.jacobian(names) ** 2, axis=2)))) if names else 0.0
     if not lever:
         return model
-    told = model.scatter.joints > 0
-    own = [
-        f"scatter.{joint.name}.angular" for joint, is_told in zip(model.joints, told, strict=True) if is_told
-    ]
+    own = [name for name in joint_scatter(model) if model.value(name) > 0]
     more = model.value("scatter.robot") / lever
     angular = {name: float(np.hypot(model.value(name), more)) for name in ("scatter.angular", *own)}
     return model.with_values({"scatter.robot": 0.0, **angular})

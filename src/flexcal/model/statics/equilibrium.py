@@ -251,19 +251,26 @@ def rotations_by_geometry(
     count = len(turning)
     slopes[:, :count] *= -geometry.gravity_compliance[turning][:, None]
     if leaning:
-        tilt, compliance = lateral_axes(model, q)[:, leaning], geometry.lateral_compliance[leaning]
-        moments = -loads[:, count:].reshape(len(q), -1, 2)
-        by_load = -np.einsum("ja,sjac,sjad->sjcd", compliance, tilt, tilt)
-        own = slopes[:, count:].reshape(len(q), len(leaning), 2, -1)
-        slopes[:, count:] = (by_load @ own).reshape(len(q), 2 * len(leaning), -1)
-        if model.bearings == "after":
-            # these axes turn with the joint
-            turned = np.stack([tilt[..., 1], -tilt[..., 0]], axis=-1)
-            across = np.einsum("ja,sjac,sjad->sjcd", compliance, turned, tilt)
-            change = -np.einsum("sjcd,sjd->sjc", across + across.swapaxes(2, 3), moments)
-            for k, joint in enumerate(leaning):
-                slopes[:, count + 2 * k : count + 2 * k + 2, 6 * joint] += change[:, k]
+        _to_tilts(model, q, leaning, -loads[:, count:], slopes[:, count:])
     return axes, slopes
+
+
+def _to_tilts(
+    model: RobotModel, q: np.ndarray, leaning: list[int], moments: np.ndarray, slopes: np.ndarray
+) -> None:
+    """Turn `slopes` (samples, 2 k, G) of gravity's `moments` (samples, 2 k) about the tilt axes of k joints into those of their tilts."""
+    tilt, compliance = lateral_axes(model, q)[:, leaning], model.geometry.lateral_compliance[leaning]
+    by_load = -np.einsum("ja,sjac,sjad->sjcd", compliance, tilt, tilt)
+    paired = (len(q), len(leaning), 2, slopes.shape[2])
+    slopes[:] = (by_load @ slopes.reshape(paired)).reshape(slopes.shape)
+    if model.bearings == "after":
+        # these axes turn with the joint
+        turned = np.stack([tilt[..., 1], -tilt[..., 0]], axis=-1)
+        across = np.einsum("ja,sjac,sjad->sjcd", compliance, turned, tilt)
+        whole = across + across.swapaxes(2, 3)
+        change = -np.einsum("sjcd,sjd->sjc", whole, moments.reshape(*paired[:2], 2))
+        for k, joint in enumerate(leaning):
+            slopes[:, 2 * k : 2 * k + 2, 6 * joint] += change[:, k]
 
 
 def spring_loads(

@@ -311,9 +311,10 @@ def check_gain(
                 f"and point found, to {millimetres(uncalibrated)} mm. Look for wrong readings, and measure more poses."
             )
             return (Check(question, answer, "care").named("gain"),)
-    if extent is None or extent["corrected_mm"] is None:
+    corrected = None if extent is None else extent.get("corrected_mm")  # earlier results have none
+    if extent is None or corrected is None:
         return ()
-    open_, corrected = extent["beyond_mm"], extent["corrected_mm"]
+    open_ = extent["beyond_mm"]
     if open_ < _ALL * np.hypot(open_, corrected):
         return ()
     answer = (

@@ -132,11 +132,8 @@ def _sentence(results: Mapping[str, Any]) -> str:
             if prior is None
             else f" To be calibrated with the prior of {len(prior['robots'])} other robots, {prior['file']}: {prior['sentence']}."
         )
-        size = (
-            ""
-            if results.get("measure") is None
-            else f" How large the robot is: {results['size']['sentence']}."
-        )
+        told = results.get("size") if results.get("measure") is not None else None
+        size = "" if told is None else f" How large the robot is: {told['sentence']}."
         return (
             f"Measured with {results['instrument']}, they predict a tool error of {significant(results['tool_error_mm'], 3)} mm from its "
             f"noise alone; no choice of as many reaches less than {significant(results['least_possible_mm'], 3)} mm.{size}{with_prior}"
