@@ -16,6 +16,7 @@ import numpy as np
 import polars as pl
 import pytest
 import yaml
+from mcap_messages import trajectory_in
 from played_robot import KD, KP, ROBOT, STEPS, URDF, Log, Robot, Stepped, gravity
 from refusals import assert_refusal
 
@@ -370,6 +371,25 @@ def test_messages_of_ros(run, tmp_path: Path) -> None:
         assert np.allclose([at["sec"] + 1e-9 * at["nanosec"] for at in stamps], signal.time, atol=1e-9)
     (move,) = manifest(folder / "ros", "moves.csv")
     assert "effort" not in yaml.safe_load((folder / "ros" / move["file"]).read_text())["points"][0]
+
+
+def test_messages_of_ros_in_mcap_files(run, tmp_path: Path) -> None:
+    folder = project(tmp_path / "fence", periods=2, realisations=1)
+    asked = ("export", "excitation", folder / "frequency.yaml", "--rate", 200)
+    for kind in ("ros", "mcap"):
+        assert run(*asked, "--format", kind, "--out", folder / kind).status == 0
+    for name in ("manifest.csv", "moves.csv"):
+        for text, packed in zip(manifest(folder / "ros", name), manifest(folder / "mcap", name), strict=True):
+            file = folder / "mcap" / packed["file"]
+            assert packed["sha256"] == hashlib.sha256(file.read_bytes()).hexdigest()
+            said = yaml.safe_load((folder / "ros" / text["file"]).read_text())
+            heard = trajectory_in(file)
+            assert heard.joint_names == said["joint_names"]
+            for one, other in zip(heard.points, said["points"], strict=True):
+                for key in ("positions", "velocities", "accelerations", "effort"):
+                    assert np.allclose(getattr(one, key), other.get(key, []), rtol=0, atol=1e-9)
+                at = {"sec": one.time_from_start.sec, "nanosec": one.time_from_start.nanosec}
+                assert at == other["time_from_start"]
 
 
 def test_currents_where_the_torque_constants_are_known(run, tmp_path: Path) -> None:

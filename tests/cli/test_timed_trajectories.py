@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import yaml
+from mcap_messages import trajectory_in
 from refusals import assert_refusal
 
 URDF = """<robot name="gantry"><link name="base"/>
@@ -181,6 +182,12 @@ def test_a_file_of_another_beside_the_plan_is_refused(run, gantry: Path) -> None
         "plan_1.csv",
         "plan_1_ros.yaml",
     ]
+    assert run(*plan, "--count", 1, "--ros", "mcap").status == 0
+    assert sorted(path.name for path in folder.glob("plan_*")) == ["plan_1.csv", "plan_1_ros.mcap"]
+    message, rows = trajectory_in(folder / "plan_1_ros.mcap"), motion(folder / "plan_1.csv")[1]
+    assert message.joint_names == ["rail", "shoulder", "elbow"]
+    written = [np.concatenate([p.positions, p.velocities, p.accelerations]) for p in message.points]
+    assert np.array_equal(written, rows[:, 1:])
     (folder / "plan_2.csv").write_text("mine\n")
     outcome = run(*plan, "--count", 2)
     assert outcome.status == 2

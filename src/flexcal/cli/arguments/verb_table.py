@@ -131,7 +131,11 @@ STEPS = (
                 "plan exciting trajectories of the whole robot",
                 "flexcal design trajectory robot.yaml --out trajectory.yaml",
                 page=True,
-                beside=("_[1-9].csv", "_[1-9][0-9].csv", "_[1-9]_ros.yaml", "_[1-9][0-9]_ros.yaml"),
+                beside=tuple(
+                    number + kind
+                    for number in ("_[1-9]", "_[1-9][0-9]")
+                    for kind in (".csv", "_ros.yaml", "_ros.mcap")
+                ),
             ),
             Verb(
                 ("identify", "inertials"),

@@ -77,6 +77,8 @@ class DesignTrajectory:
         Between(1, 20_000),
     ] = None
     """Timed joint positions a second; the cycle of a controller that takes one position each."""
+    ros: Literal["yaml", "mcap"] = "yaml"
+    """The ROS JointTrajectory as YAML for ros2 topic pub, or in MCAP files for ros2 bag play."""
     seed: Seed = 0
     """Seed of the random starts."""
     json: Json = False
@@ -111,6 +113,7 @@ class DesignTrajectory:
                 request,
                 after=self.after,
                 rate_hz=self.rate,
+                ros=self.ros,
                 command=command_line(),
                 progress=progress,
             ).document()

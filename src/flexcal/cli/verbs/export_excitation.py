@@ -43,8 +43,8 @@ class ExportExcitation:
     controller makes the plan's torques of it; files have no tau1…."""
     whole: bool = False
     """Write the whole signal, not one period of it to be repeated."""
-    format: Literal["csv", "parquet", "ros"] = "csv"
-    """Format of signals and moves; ros: trajectory_msgs/JointTrajectory as YAML, whole, with effort."""
+    format: Literal["csv", "parquet", "ros", "mcap"] = "csv"
+    """Format of signals and moves; ros and mcap: trajectory_msgs/JointTrajectory as YAML or in MCAP files, whole, with effort."""
     robot: Annotated[
         MaybePath,
         arg(metavar="ROBOT", help_behavior_hint="(default: beside PLAN, else in the current folder)"),

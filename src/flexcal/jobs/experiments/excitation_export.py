@@ -26,8 +26,10 @@ from flexcal.model.statics import tool_at_rest
 from flexcal.progress import Progress, silent
 
 MANIFEST, MOVES, PHASES = "manifest.csv", "moves.csv", "phases.csv"
-Format = Literal["csv", "parquet", "ros"]
-_ENDINGS = {"csv": ".csv", "parquet": ".parquet", "ros": ".yaml"}
+Format = Literal["csv", "parquet", "ros", "mcap"]
+_ENDINGS = {"csv": ".csv", "parquet": ".parquet", "ros": ".yaml", "mcap": ".mcap"}
+_WHOLE = (".yaml", ".mcap")
+"""Endings of trajectories of ROS, which a controller plays from beginning to end."""
 _DIGITS = 9
 """Significant digits of written values, of the largest of a column."""
 _MOVE_SHARE = 0.1
@@ -81,9 +83,9 @@ def export_excitation(
 
     `rate_hz` is the controller's (default: the plan's), `scale` multiplies the amplitudes; both go into `out`/plan.yaml, the plan as it is
     played. With `bandwidth_hz` the robot takes positions alone, through a controller of about this bandwidth: the reference makes the
-    plan's torques (`PositionLoop`). A file holds one period of excitation and reference motion, or with `whole`, and in `format` ros, all
-    of them. Raises `FlexcalError` where the plan does not fit the robot of robot.yaml, lines do not fit the rate, the robot touches
-    something, or a limit is passed (`signal_uses`).
+    plan's torques (`PositionLoop`). A file holds one period of excitation and reference motion, or with `whole`, and as ROS
+    trajectories (`format` ros or mcap), all of them. Raises `FlexcalError` where the plan does not fit the robot of robot.yaml, lines do
+    not fit the rate, the robot touches something, or a limit is passed (`signal_uses`).
     """
     model = RobotModel.from_yaml(robot_file(plan_file, robot))
     plan = read_plan_of(plan_file, MultisinePlan)
@@ -106,8 +108,8 @@ def export_excitation(
     write_plan(out / PLAN, played)
     write_table(out / PHASES, _phases(played))
     total = len(played.poses) * played.recordings_per_pose
-    rows, whole = [], whole or format == "ros"
     ending = _ENDINGS[format]
+    rows, whole = [], whole or ending in _WHOLE
     motions = None if loop is None else loop.motions
     for number, signal in enumerate(played_signals(played, whole=whole, motions=motions), start=1):
         name = _label(signal).name + ending
@@ -165,7 +167,7 @@ def _write(
     torque: np.ndarray | None = None,
 ) -> None:
     """Write a motion as a trajectory of ROS, or as a table, by the name's ending."""
-    if file.suffix == _ENDINGS["ros"]:
+    if file.suffix in _WHOLE:
         TimedPositions(model.joint_names, time, q, dq, effort=torque).rounded().write_ros(file)
     else:
         write_table(

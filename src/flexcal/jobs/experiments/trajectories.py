@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -160,6 +160,8 @@ class DesignedTrajectories(PlottedResult):
         Joints whose friction robot.yaml does not give.
     file : Path or None
         File of the plan, where it was written.
+    ros : {"yaml", "mcap"}
+        Format of the ROS messages beside the plan.
     record : RunRecord
         What the result comes from.
     """
@@ -169,6 +171,7 @@ class DesignedTrajectories(PlottedResult):
     rate_hz: float
     assumed_friction: tuple[str, ...]
     file: Path | None = None
+    ros: Literal["yaml", "mcap"] = "yaml"
     record: RunRecord = NOT_RECORDED
 
     @property
@@ -204,7 +207,7 @@ class DesignedTrajectories(PlottedResult):
         """Paths of CSV and ROS message of every trajectory, beside the plan."""
         plan = Path("trajectory.yaml") if self.file is None else self.file
         stems = [f"{plan.stem}_{number}" for number in range(1, len(self.timed) + 1)]
-        return [(plan.with_name(f"{stem}.csv"), plan.with_name(f"{stem}_ros.yaml")) for stem in stems]
+        return [(plan.with_name(f"{stem}.csv"), plan.with_name(f"{stem}_ros.{self.ros}")) for stem in stems]
 
     @cached_property
     def conditions(self) -> list[float]:
@@ -334,24 +337,25 @@ def plan_trajectories(
     *,
     after: Path | None = None,
     rate_hz: float | None = None,
+    ros: Literal["yaml", "mcap"] = "yaml",
     command: str = "",
     progress: Progress = silent,
 ) -> DesignedTrajectories:
     """`design_trajectories` for the nominal robot of a robot.yaml, after the recorded plan of the file `after`.
 
-    The plan goes to the file `out`; beside it a page of pictures, and the motions as timed positions. Raises `FlexcalError` as
-    `design_trajectories` does.
+    The plan goes to the file `out`; beside it a page of pictures, and the motions as timed positions, in CSV and as
+    `ros` messages. Raises `FlexcalError` as `design_trajectories` does.
     """
     nominal = RobotModel.from_yaml(robot_file, estimates=False)
     if after is not None:
         request = replace(request, after=read_plan_of(after, TrajectoryPlan))
     origin = provenance([robot_file, nominal.urdf, *(() if after is None else (after,))])
     designed = design_trajectories(nominal, request, rate_hz=rate_hz, progress=progress)
-    result = replace(designed, file=out, record=RunRecord(origin, command))
+    result = replace(designed, file=out, ros=ros, record=RunRecord(origin, command))
     result.report(page_beside(out))
-    for motion, (csv, ros) in zip(result.timed, result.timed_files, strict=True):
+    for motion, (csv, message) in zip(result.timed, result.timed_files, strict=True):
         motion.positions.write_csv(csv)
-        motion.positions.write_ros(ros)
+        motion.positions.write_ros(message)
     write_plan(out, result.plan)
     return result
 
