@@ -308,8 +308,9 @@ def test_a_fit_that_turned_an_axis_round_is_remarked(ur5: RobotModel, examples: 
     wrong = poses.q * np.array([1, 1, 1, -1, 1, 1])
     found = fit_geometry(ur5, replace(poses, q=wrong), terms=("kinematic",))
     assert found.errors.max < 0.3e-3
-    assert implausible_shifts(found)[0].name.startswith("wrist_1_joint.misalignment")
-    assert abs(abs(implausible_shifts(found)[0].value) - np.pi) < 0.02
+    # which of the axes that are turned round with it comes first is rounding
+    turned = [item for item in implausible_shifts(found) if abs(abs(item.value) - np.pi) < 0.02]
+    assert any(item.name.startswith("wrist_1_joint.misalignment") for item in turned)
 
 
 def test_a_spring_far_from_what_stage_one_said_is_remarked(simulate: Callable, tx90l: RobotModel) -> None:

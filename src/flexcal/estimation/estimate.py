@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -93,7 +94,7 @@ class Estimate:
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     measurements: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def values(self) -> dict[str, float]:
         """Estimates in natural units, by name."""
         return {item.name: item.value for item in self.parameters}

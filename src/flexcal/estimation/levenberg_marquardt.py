@@ -10,7 +10,8 @@ from flexcal.estimation.anderson_acceleration import AndersonAcceleration
 from flexcal.estimation.objective import Objective
 from flexcal.progress import Progress, silent
 
-_FIRST_DAMPING = 1e-3
+FIRST_DAMPING = 1e-3
+"""Damping of the first step, relative to the largest columns' squares, of a problem of which nothing is known (Nielsen 1999)."""
 _LARGEST_DAMPING = 1e14
 _SMALLEST_DAMPING = 1e-18
 _ROUNDING = 1e-13
@@ -48,6 +49,7 @@ def minimise(
     tolerance: float,
     progress: Progress = silent,
     first: tuple[np.ndarray, np.ndarray] | None = None,
+    damping: float = FIRST_DAMPING,
 ) -> Optimum:
     """Minimise over the coordinates marked in `free` (p,), from `x` (p,), where the linearisation may be known as `first`.
 
@@ -70,7 +72,7 @@ def minimise(
     residual, jacobian = objective.linearise(x) if first is None else objective.checked(*first)
     cost = first_cost = objective.cost(residual, x)
     scale = np.zeros(x.size)
-    damping, growth, fall, best_offset = _FIRST_DAMPING, 2.0, 1.0 / 3.0, np.inf
+    growth, fall, best_offset = 2.0, 1.0 / 3.0, np.inf
     status, message, iteration, polishing = "iteration limit", "", 0, False
     acceleration, moved = AndersonAcceleration(), np.zeros(0, dtype=int)
     stationary = max(_STATIONARY, _SHORT / np.sqrt(max(residual.size, 1)))

@@ -98,7 +98,7 @@ class Parameters:
 
     @property
     def names(self) -> tuple[str, ...]:
-        return tuple(item.name for item in self.items)
+        return tuple(self._index)
 
     @property
     def units(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.estimation.estimate import Estimate
 from flexcal.estimation.identifiability import RANK_TOLERANCE, Identifiability
-from flexcal.estimation.levenberg_marquardt import Optimum, minimise
+from flexcal.estimation.levenberg_marquardt import FIRST_DAMPING, Optimum, minimise
 from flexcal.estimation.loss import OUTLIER_WEIGHT, Loss, Squares, loss_named
 from flexcal.estimation.objective import Objective
 from flexcal.estimation.parameter import Parameters
@@ -31,6 +31,7 @@ def solve(
     tolerance: float = 1e-9,
     rank_tolerance: float = RANK_TOLERANCE,
     prefer: Sequence[str] = (),
+    damping: float = FIRST_DAMPING,
     progress: Progress = silent,
 ) -> Estimate:
     """Minimise a problem, and determine rank and covariance at the optimum.
@@ -40,7 +41,8 @@ def solve(
     (relative `rank_tolerance`, see `analyse` and its `prefer`), the dropped parameters go back to their values in
     `problem.parameters` and the kept ones are fitted again. `covariance`: "posterior" trusts whitening and prior,
     "sandwich" lets the scatter of the groups speak. `loss` is robust on group norms; groups whose weight ends below 0.2 are
-    listed as outliers. `progress` is called at every iteration, with its share of `max_iterations`.
+    listed as outliers. `damping` is that of the first step, less for a problem that is nearly linear. `progress` is called at
+    every iteration, with its share of `max_iterations`.
 
     Raises FlexcalError for shapes that do not fit, a model that cannot be evaluated at any start, or no rows at all. A fit
     that does not converge is returned with its status and a message that says what to do.
@@ -71,6 +73,7 @@ def solve(
                     tolerance=tolerance,
                     progress=progress,
                     first=first,
+                    damping=damping,
                 )
             )
         except FlexcalError as error:

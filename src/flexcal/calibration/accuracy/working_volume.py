@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +84,8 @@ def _in_batches(
     fill: Callable[[slice], None], count: int, threads: int | None = None, progress: Progress = silent
 ) -> None:
     """Call `fill` with the rows of every batch of `count` poses, in `threads`; None takes all cores."""
+    from concurrent.futures import ThreadPoolExecutor
+
     starts = range(0, count, _BATCH)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         batches = pool.map(lambda start: fill(slice(start, start + _BATCH)), starts)

@@ -132,7 +132,10 @@ def place_errors(fit: GeometricFit) -> tuple[PlaceErrors, ...]:
 
     Outliers do not count in the fit. Stiffness and inertia keep their estimates, as the error model does.
     """
-    poses, linear, result = fit.poses, LinearisedPlaces.of(fit), []
+    poses, result = fit.poses, []
+    if not poses.fixtures:
+        return ()
+    linear = LinearisedPlaces.of(fit)
     _, whole, freedom = linear.solved(linear.inside)
     inside = ~np.isin(np.arange(len(poses)), fit.estimate.outliers)
     for fixture in poses.fixtures:

@@ -6,6 +6,8 @@ import numpy as np
 
 _SAME = 0.01
 """Difference of joint positions, rad or m, below which poses are the same."""
+_PAIRS = 1_000_000
+"""Number of pairs of rows that are compared all at once."""
 
 
 def repeated_pose_numbers(q: np.ndarray) -> np.ndarray:
@@ -19,7 +21,13 @@ def repeated_pose_numbers(q: np.ndarray) -> np.ndarray:
     reach = 1.001 * _SAME  # wider by more than rounding
     first = np.searchsorted(along[order], along - reach)
     last = np.searchsorted(along[order], along + reach)
-    for row in range(len(q)):
+    if (last - first).sum() <= _PAIRS:
+        row, place = np.repeat(np.arange(len(q)), last - first), np.arange((last - first).sum())
+        close = order[place - np.repeat(np.cumsum(last - first) - last, last - first)]
+        near = np.abs(q[close] - q[row]).max(axis=1) < _SAME
+        alone = np.bincount(row[near], minlength=len(q)) == 1
+        result[alone] = np.flatnonzero(alone)
+    for row in np.flatnonzero(result < 0):
         if result[row] < 0:
             close = order[first[row] : last[row]]
             near = (np.abs(q[close] - q[row]).max(axis=1) < _SAME) & (result[close] < 0)

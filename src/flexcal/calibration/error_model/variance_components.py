@@ -331,6 +331,10 @@ class LinearFit:
             step = _step(x, slope, information, largest)
             # the factor's logarithm is steep near zero: a step that lands there returns by doubling
             smallest = np.maximum(_SMALLEST, np.where(favoured + known > 0, _TO_ZERO * x, 0.0))
+            if -float(slope @ step) < still:
+                # the likelihood and its information are those before the last step
+                x = np.clip(x + step, smallest, largest)
+                break
             for _ in range(_HALVINGS):
                 tried = np.clip(x + step, smallest, largest)
                 after = self._at(names, tried * scale, share)
@@ -339,10 +343,7 @@ class LinearFit:
                 step /= 2
             else:
                 break
-            change = abs(float(slope @ (tried - x)))
             x, at = tried, after
-            if change < still:
-                break
         return _Maximum(names, scale, x * scale, -0.5 * deviance(x, at), at)
 
     @cached_property

@@ -19,6 +19,8 @@ from flexcal.progress import Progress
 
 PlainLoss = Literal["squares", "huber", "cauchy"]
 LossName = Literal["auto", "squares", "huber", "cauchy"]
+_DAMPING = 1e-5
+"""Damping of the first step: errors of a robot move its point nearly in proportion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +80,7 @@ class GeometryProblem:
             return dict(zip(parameters.names, parameters.natural(x), strict=True))
 
         readings = Readings.of(self.predictions.poses)
-        there = readings.present.ravel()
+        there = slice(None) if readings.present.all() else readings.present.ravel()
 
         def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             at = self.predicted(values(x), jacobians=True)
@@ -88,4 +90,4 @@ class GeometryProblem:
 
         groups = np.repeat(readings.row, 3)[there]
         problem = Problem(parameters, linearise, None, self.prior_covariance, groups)
-        return solve(problem, loss=loss, tolerance=tolerance, progress=progress)
+        return solve(problem, loss=loss, tolerance=tolerance, damping=_DAMPING, progress=progress)

@@ -28,7 +28,7 @@ from flexcal.model.robot import (
 from flexcal.model.statics import (
     carried_mass,
     rotations_by_geometry,
-    transmission_column,
+    transmission_columns,
     twist_by_hardening,
     twist_from_torque,
 )
@@ -55,7 +55,7 @@ class ArmColumns:
             elif name in places:
                 errors[k] = places[name]
             elif kind in _TWISTS:
-                twists[k] = (joint := self.at.model.joint_index(owner)), self._twist(joint, key)
+                twists[k] = self.at.model.joint_index(owner), key
             elif kind in _BY_KEY:
                 result[:, :, k] = _BY_KEY[kind](self, owner, key)
             else:
@@ -63,9 +63,9 @@ class ArmColumns:
         if errors:
             result[:, :, as_slice(list(errors))] = self._by_geometry.take(list(errors.values()), axis=2)
         if twists:
-            joints, moved = zip(*twists.values(), strict=True)
-            twist = self.at.by_row(np.stack(moved, axis=1))[:, None]
-            result[:, :, as_slice(list(twists))] = twist * self._under_load.take(6 * np.array(joints), axis=2)
+            twist = self.at.by_row(self._twists(list(twists.values())))[:, None]
+            joints = 6 * np.array([joint for joint, _ in twists.values()])
+            result[:, :, as_slice(list(twists))] = twist * self._under_load.take(joints, axis=2)
         if loads:
             load = self.at.by_row(np.stack(list(loads.values()), axis=2))
             result[:, :, as_slice(list(loads))] = np.matmul(self._by_load, load)
@@ -177,13 +177,18 @@ class ArmColumns:
     def _shifted_station(self, owner: str, key: str) -> np.ndarray:
         return station_drift_column(self.at, f"{owner}.{key}")
 
-    def _twist(self, joint: int, key: str) -> np.ndarray:
-        """Motion (N,) of a joint by its backlash, gravity compliance or one wave or ratio of its transmission."""
-        if key == "backlash":
-            return -self.at.rest.flank[:, joint]
-        if key == "gravity_compliance":
-            return -self.at.rest.torque[:, joint]
-        return transmission_column(self.at.model, self.at.poses.q, joint, key)
+    def _twists(self, twists: Sequence[tuple[int, str]]) -> np.ndarray:
+        """Motions (N, T) of joints by their backlash, gravity compliance or one wave or ratio of their transmission: joint and key of T."""
+        rest, result = self.at.rest, np.empty((len(self.at.poses), len(twists)))
+        waves = {k: twist for k, twist in enumerate(twists) if twist[1] not in _SIDES}
+        for k, (joint, key) in enumerate(twists):
+            if key in _SIDES:
+                result[:, k] = -(rest.flank if key == "backlash" else rest.torque)[:, joint]
+        if waves:
+            result[:, list(waves)] = transmission_columns(
+                self.at.model, self.at.poses.q, list(waves.values())
+            )
+        return result
 
     def _load(self, name: str) -> np.ndarray:
         """Change of the load on each elastic coordinate (N, d) with a stiffness, mass or centre of mass."""
@@ -237,7 +242,8 @@ def _shifted(at: PointKinematics, parent: int, axis: int, carried: np.ndarray) -
     return np.where(carried[:, None, None], moved, 0.0)
 
 
-_TWISTS = ("backlash", "gravity_compliance", "transmission")
+_SIDES = ("backlash", "gravity_compliance")
+_TWISTS = (*_SIDES, "transmission")
 _BY_KEY: Mapping[str, Callable[[ArmColumns, str, str], np.ndarray]] = {
     **dict.fromkeys(GEOMETRY, ArmColumns._tool),
     **dict.fromkeys(ORIGIN, ArmColumns._origin),

@@ -39,7 +39,7 @@ from flexcal.model.statics import (
     lateral_slopes,
     spring_loads,
     tangent_ratio,
-    transmission_column,
+    transmission_columns,
     twist_by_hardening,
     twist_from_torque,
 )
@@ -173,7 +173,7 @@ class Propagation:
     def _twist(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Rotations (N, T) of joints by the twisting parameters, for springs loaded by `loads` (N, d)."""
         columns = np.empty((len(q), len(self.twisting)))
-        torque = self._torque(q, loads)
+        torque, waves = self._torque(q, loads), list[int]()
         for k, (joint, kind) in enumerate(self.twisting):
             if kind == "backlash":
                 columns[:, k] = -np.sign(torque[:, joint])
@@ -190,7 +190,8 @@ class Propagation:
             elif kind in (*LATERAL, HYSTERESIS):
                 columns[:, k] = 0.0
             else:
-                columns[:, k] = transmission_column(self.model, q, joint, kind)
+                waves.append(k)
+        columns[:, waves] = transmission_columns(self.model, q, [self.twisting[k] for k in waves])
         return columns
 
     def _tilt(self, q: np.ndarray, by_tilt: np.ndarray, twists: np.ndarray) -> None:

@@ -89,9 +89,8 @@ def cross_validated(fit: GeometricFit) -> CrossValidation | None:
     by = left_out_by(inside.poses, distinct)
     trials = TermTrials(inside, fit.model, fit.terms, folds, by=by)
     left = trials.decided(fit.terms)
-    worst = int(np.argmax([distance.mean() for distance in left.distances]))
-    growth = left.expected[worst].mean() / left.expected_fitted.mean()
-    mean = float(left.distances[worst].mean())
+    growth = left.expected.mean() / left.expected_fitted.mean()
+    mean = max(float(distance.mean()) for distance in left.distances)
     return CrossValidation(by, mean, left.freedom, float(growth * left.fitted.mean()))
 
 

@@ -19,15 +19,16 @@ class LeaveOutErrors:
 
     `distances` has, for each kind of fold, the distance (N,) m between points and their prediction from the other folds; `squares` (m²) is
     what the fit to all points leaves, a prior's penalty included; `freedom` the trace of the hat matrix, its number of parameters;
-    `fitted` (N,) m the distances that it leaves. Where the variances of the readings were given, `expected` has for each kind of fold the
-    mean distances (N,) m of independent errors with these variances, and `expected_fitted` (N,) those that the fit leaves of them.
+    `fitted` (N,) m the distances that it leaves. Where the variances of the readings were given, `expected` has the mean distances (N,) m
+    of independent errors with these variances for the kind of fold with the largest `distances`, and `expected_fitted` (N,) those that
+    the fit leaves of them.
     """
 
     distances: tuple[np.ndarray, ...]
     squares: float
     freedom: float
     fitted: np.ndarray
-    expected: tuple[np.ndarray, ...] = ()
+    expected: np.ndarray = field(default_factory=lambda: np.zeros(0))
     expected_fitted: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def of_points(self, count: int) -> LeaveOutErrors:
@@ -36,7 +37,7 @@ class LeaveOutErrors:
             self,
             distances=tuple(d[:count] for d in self.distances),
             fitted=self.fitted[:count],
-            expected=tuple(d[:count] for d in self.expected),
+            expected=self.expected[:count],
             expected_fitted=self.expected_fitted[:count],
         )
 
@@ -49,45 +50,69 @@ class LeaveOutErrors:
         return float(max(self.distances[k].max() for k in kinds))
 
 
-def leave_out_fit(
-    columns: Sequence[np.ndarray],
-    penalty: Sequence[float],
-    residuals: np.ndarray,
-    folds: Sequence[np.ndarray],
-    places: Sequence[tuple[np.ndarray, np.ndarray]] = (),
-    variances: np.ndarray | None = None,
-) -> LeaveOutErrors:
-    """Fit blocks of `columns` (N, 3, k) to `residuals` (N, 3) m, and predict every fold of each kind (N,) from the others.
+@dataclass(frozen=True, eq=False)
+class LinearBasis:
+    """Orthonormal `columns` (3 N + p, p) of a linear fit to `residuals` (N, 3) m, below them the rows of its prior, of `variances` (p,)."""
 
-    With the hat matrix H of the fit to all points and r what it leaves, fold g is off by (1 - H_gg)⁻¹ r_g when it is left out
-    (Allen 1974). `penalty` is the factor on the sum of squared coefficients of each block, m²: of a prior, with the columns in its
-    standard deviations; 0 for none. H_gg = Q_g Q_gᵀ is inverted in the space of its points or of its columns, whichever is smaller.
-    `places`: rows (m,) and columns (m, 3, k) by the place of each fixture; one that is left out whole is placed by its own points.
-    `variances` (N, 3), m², are those of the residuals' errors, zero where nothing was measured.
-    """
-    scaled = [
-        block * _scale(block) if free == 0 else block for block, free in zip(columns, penalty, strict=True)
-    ]
-    stacked = np.concatenate(scaled, axis=2).reshape(residuals.size, -1)
-    variance = float(np.mean(residuals**2))
-    roots = [
-        np.full(block.shape[2], np.sqrt(factor if factor > 0 else variance / _REACH**2))
-        for block, factor in zip(columns, penalty, strict=True)
-    ]
-    basis, _ = np.linalg.qr(np.concatenate([stacked, np.diag(np.concatenate(roots))]))
-    seen = basis[: residuals.size]
-    left = residuals.ravel() - seen @ (seen.T @ residuals.ravel())
-    q, r = seen.reshape(len(residuals), 3, -1), left.reshape(-1, 3)
-    distances = tuple(_distances(q, r, fold, places) for fold in folds)
-    found = LeaveOutErrors(
-        distances, float(left @ residuals.ravel()), float((seen**2).sum()), np.linalg.norm(r, axis=1)
-    )
-    if variances is None:
-        return found
-    of_prior = [np.full(block.shape[2], factor) for block, factor in zip(columns, penalty, strict=True)]
-    spread = basis.T @ (np.concatenate([variances.ravel(), *of_prior])[:, None] * basis)
-    expected = tuple(_expected_distances(q, variances, spread, fold, places) for fold in folds)
-    return replace(found, expected=expected, expected_fitted=_expected_residuals(q, variances, spread))
+    residuals: np.ndarray
+    columns: np.ndarray
+    variances: np.ndarray
+
+    @classmethod
+    def of(cls, residuals: np.ndarray) -> LinearBasis:
+        """Basis of a fit without columns."""
+        return cls(residuals, np.zeros((residuals.size, 0)), np.zeros(0))
+
+    def extended(self, block: np.ndarray, penalty: float) -> LinearBasis:
+        """Basis with a further block (N, 3, k) of columns.
+
+        `penalty` is the factor on the sum of squared coefficients of the block, m²: of a prior, with the columns in its standard
+        deviations; 0 for none. Projected off the others twice, which is as accurate as reflections (Giraud & Langou 2005).
+        """
+        count, known = block.shape[2], len(self.variances)
+        if not count:
+            return self
+        root = np.sqrt(penalty if penalty > 0 else float(np.mean(self.residuals**2)) / _REACH**2)
+        scaled = block if penalty > 0 else block * _scale(block)
+        further = np.zeros((len(self.columns) + count, count))
+        further[: self.residuals.size] = scaled.reshape(-1, count)
+        further[len(self.columns) :] = root * np.eye(count)
+        seen = further[: len(self.columns)]
+        for _ in range(2 if known else 0):
+            seen -= self.columns @ (self.columns.T @ seen)
+        columns = np.zeros((len(further), known + count))
+        columns[: len(self.columns), :known] = self.columns
+        columns[:, known:] = np.linalg.qr(further)[0]
+        return LinearBasis(self.residuals, columns, np.append(self.variances, np.full(count, penalty)))
+
+    def left_out(
+        self,
+        folds: Sequence[np.ndarray],
+        places: Sequence[tuple[np.ndarray, np.ndarray]] = (),
+        variances: np.ndarray | None = None,
+    ) -> LeaveOutErrors:
+        """Predict every fold of each kind (N,) from the others.
+
+        With the hat matrix H of the fit to all points and r what it leaves, fold g is off by (1 - H_gg)⁻¹ r_g when it is left out
+        (Allen 1974). H_gg = Q_g Q_gᵀ is inverted in the space of its points or of its columns, whichever is smaller.
+        `places`: rows (m,) and columns (m, 3, k) by the place of each fixture; one that is left out whole is placed by its own points.
+        `variances` (N, 3), m², are those of the residuals' errors, zero where nothing was measured.
+        """
+        residuals = self.residuals
+        seen = self.columns[: residuals.size]
+        left = residuals.ravel() - seen @ (seen.T @ residuals.ravel())
+        q, r = seen.reshape(len(residuals), 3, -1), left.reshape(-1, 3)
+        distances = tuple(_distances(q, r, fold, places) for fold in folds)
+        found = LeaveOutErrors(
+            distances, float(left @ residuals.ravel()), float((seen**2).sum()), np.linalg.norm(r, axis=1)
+        )
+        if variances is None:
+            return found
+        rows = np.concatenate([variances.ravel(), self.variances])
+        spread = self.columns.T @ (rows[:, None] * self.columns)
+        worst = folds[int(np.argmax([distance.mean() for distance in distances]))]
+        expected = _expected_distances(q, variances, spread, worst, places)
+        return replace(found, expected=expected, expected_fitted=_expected_residuals(q, variances, spread))
 
 
 def _scale(block: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from flexcal.calibration.measurement import (
     PredictedMeasurements,
     predict_measurements,
 )
-from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, leave_out_fit
+from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, LinearBasis
 from flexcal.model.robot import GEOMETRY, HYSTERESIS, ORIGIN, STATION, RobotModel
 from flexcal.units import MILLIMETRE, decimals
 
@@ -97,6 +97,7 @@ class TermTrials:
         self._out = [_PLACES_OUT if by == "places" else text for text in _OUT]
         self._columns: dict[str, np.ndarray] = {}
         self._fits: dict[tuple[str, ...], LeaveOutErrors] = {}
+        self._before: tuple[tuple[str, ...] | None, LinearBasis] = None, LinearBasis.of(np.zeros((0, 3)))
         self._base = base
 
     def start(self) -> TermComparison:
@@ -143,24 +144,28 @@ class TermTrials:
     def fit(self, terms: tuple[str, ...]) -> LeaveOutErrors:
         """Fit of some terms, with springs and inertia as in the base fit."""
         if terms not in self._fits:
-            self._fits[terms] = self._left_out(*self._blocks(terms))
+            self._fits[terms] = self._left_out(self._basis(terms))
         return self._fits[terms]
 
     def decided(self, terms: tuple[str, ...]) -> LeaveOutErrors:
         """Fit of some terms, with the decisive kinds of folds alone, and the errors to expect from the scatter of the base fit."""
         folds = [self._row_folds[kind] for kind in self.deciding]
-        fit = leave_out_fit(*self._blocks(terms), self._residual, folds, self._places, self._variances)
-        return fit.of_points(len(self.rigid.poses))
+        left = self._basis(terms).left_out(folds, self._places, self._variances)
+        return left.of_points(len(self.rigid.poses))
 
-    def _blocks(self, terms: tuple[str, ...]) -> tuple[list[np.ndarray], list[float]]:
-        """Columns of some terms and of what has a prior, and the penalty of each."""
-        return [*map(self._block, terms), self._held], [*[0.0] * len(terms), self._noise]
+    def _basis(self, terms: tuple[str, ...]) -> LinearBasis:
+        """Basis of some terms and of what has a prior; that without the last term is kept for others in its place."""
+        if not terms:
+            return LinearBasis.of(self._residual).extended(self._held, self._noise)
+        if self._before[0] != terms[:-1]:
+            self._before = terms[:-1], self._basis(terms[:-1])
+        return self._before[1].extended(self._block(terms[-1]), 0.0)
 
-    def _left_out(self, blocks: list[np.ndarray], penalty: list[float]) -> LeaveOutErrors:
+    def _left_out(self, basis: LinearBasis) -> LeaveOutErrors:
         order, workspace, alone = self._row_folds
         # folds in measuring order are those in the workspace where both are places of a fixture
         folds = (order, alone) if (order == workspace).all() else (order, workspace, alone)
-        fit = leave_out_fit(blocks, penalty, self._residual, folds, self._places)
+        fit = basis.left_out(folds, self._places)
         if len(folds) < len(self._row_folds):
             fit = replace(fit, distances=(fit.distances[0], *fit.distances))
         return fit.of_points(len(self.rigid.poses))
@@ -169,7 +174,7 @@ class TermTrials:
         """Fit of those parameters of the base fit that its points determine."""
         held = [item.name for item in self.rigid.undetermined]
         kept = [name for name in self._free if name not in held]
-        return self._left_out([self._seen(kept), self._held], [0.0, self._noise])
+        return self._left_out(self._basis(()).extended(self._seen(kept), 0.0))
 
     def mean(self, terms: tuple[str, ...]) -> float:
         """Mean error at left-out poses, m, over the decisive kinds of folds."""

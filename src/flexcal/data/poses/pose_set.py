@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -306,12 +307,12 @@ class PoseSet:
         """Places of a fixture with sockets, in the order in which they first appear."""
         return tuple(dict.fromkeys(self.station[self.in_socket].tolist()))
 
-    @property
+    @cached_property
     def stations(self) -> tuple[str, ...]:
         """Stations in the order of first appearance."""
         return tuple(dict.fromkeys(self.station.tolist()))
 
-    @property
+    @cached_property
     def targets(self) -> tuple[str, ...]:
         """Targets in the order of first appearance."""
         return tuple(dict.fromkeys(self.target.tolist()))

@@ -17,6 +17,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from flexcal import __version__
 from flexcal.errors import FlexcalError, InputError, unreadable
 from flexcal.estimation import Dropped, Estimate, Misfit, Parameter, Parameters
 from flexcal.files.formats.npz_reader import ArrayForm, NpzFile, refuse_foreign
@@ -192,9 +193,7 @@ def provenance(
     """Provenance of an estimate: program version, SHA-256 of input files and folders by name (with the path where a name repeats),
     options, and the SHA-256 of the `blocks` used from the file `estimates`.
     """
-    from importlib.metadata import version
-
-    origin = {"program": f"flexcal {version('flexcal')}"}
+    origin = {"program": f"flexcal {__version__}"}
     paths = [Path(path) for path in inputs]
     names = [path.name for path in paths]
     origin |= {f"input.{p.name if names.count(p.name) == 1 else p.as_posix()}": sha256_of(p) for p in paths}

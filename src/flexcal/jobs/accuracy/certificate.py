@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from datetime import date
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from flexcal import __version__
 from flexcal.calibration.accuracy import PoseRepeatability, visit_statistics
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import StratifiedSample
@@ -238,7 +238,7 @@ class Certificate(Result):
         return {
             "robot": self.model.name,
             "date": date.today().isoformat(),
-            "program": f"flexcal {version('flexcal')}",
+            "program": f"flexcal {__version__}",
             "targets": len(self.after.numbers),
             "points": list(poses.targets),
             "stations": list(poses.stations),

@@ -13,7 +13,7 @@ from .equilibrium import (
 )
 from .flank import are_flanks_certain, certain_flank
 from .hardening import REFERENCE_TWIST, tangent_ratio, twist_by_hardening, twist_from_torque
-from .transmission import transmission_column
+from .transmission import transmission_columns
 
 __all__ = [
     "REFERENCE_TWIST",
@@ -34,7 +34,7 @@ __all__ = [
     "static_equilibrium",
     "tangent_ratio",
     "tool_at_rest",
-    "transmission_column",
+    "transmission_columns",
     "twist_by_hardening",
     "twist_from_torque",
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from flexcal.model.kinematics import joint_positions, motor_motion
@@ -16,20 +18,25 @@ def transmission_error(model: RobotModel, q: np.ndarray) -> np.ndarray:
     waves, ratios = model.drives.transmission, model.drives.ratio_error
     error = np.zeros((len(q), len(model.joints)))
     if waves.any():
-        phase = joint_positions(model, q)[:, :, None] * np.array(model.drives.harmonics)
-        error += (waves[:, :, 0] * np.sin(phase) + waves[:, :, 1] * np.cos(phase)).sum(axis=2)
+        turned = _waves(model, q)
+        error += (waves[:, :, 0] * turned.imag + waves[:, :, 1] * turned.real).sum(axis=2)
     for joint, other in np.argwhere(ratios):
         error[:, joint] += ratios[joint, other] * _driving(model, q, joint, other)
     return error
 
 
-def transmission_column(model: RobotModel, q: np.ndarray, joint: int, key: str) -> np.ndarray:
-    """Derivative (samples,) of a joint's transmission error by a wave or a ratio, `key` being that of its parameter."""
-    if key.startswith(RATIO):
-        return _driving(model, q, joint, model.joint_index(key.removeprefix(RATIO)))
-    order, wave = key.split("_")[1:]
-    phase = int(order) * joint_positions(model, q)[:, joint]
-    return np.sin(phase) if wave == "sin" else np.cos(phase)
+def transmission_columns(model: RobotModel, q: np.ndarray, twists: Sequence[tuple[int, str]]) -> np.ndarray:
+    """Derivatives (samples, T) of joints' transmission errors by waves or ratios: joint and key of the parameter of each of T."""
+    result, waves = np.empty((len(q), len(twists))), None
+    for k, (joint, key) in enumerate(twists):
+        if key.startswith(RATIO):
+            result[:, k] = _driving(model, q, joint, model.joint_index(key.removeprefix(RATIO)))
+            continue
+        waves = _waves(model, q) if waves is None else waves
+        order, wave = key.split("_")[1:]
+        own = waves[:, joint, model.drives.harmonics.index(int(order))]
+        result[:, k] = own.imag if wave == "sin" else own.real
+    return result
 
 
 def transmission_slopes(model: RobotModel, q: np.ndarray) -> np.ndarray:
@@ -38,13 +45,20 @@ def transmission_slopes(model: RobotModel, q: np.ndarray) -> np.ndarray:
     own = np.broadcast_to(motor_motion(model), (len(q), len(model.joints), model.n)).copy()
     if waves.any():
         orders = np.array(model.drives.harmonics)
-        phase = joint_positions(model, q)[:, :, None] * orders
-        sine, cosine = np.moveaxis(orders[:, None] * waves, 2, 0)
-        own *= 1 + (sine * np.cos(phase) - cosine * np.sin(phase)).sum(axis=2)[:, :, None]
+        turned, (sine, cosine) = _waves(model, q), np.moveaxis(orders[:, None] * waves, 2, 0)
+        own *= 1 + (sine * turned.real - cosine * turned.imag).sum(axis=2)[:, :, None]
     every = motor_motion(model) if model.relations is None else model.relations.carry @ motor_motion(model)
     for joint, other in np.argwhere(ratios):
         own[:, joint] += ratios[joint, other] * (motor_motion(model) if joint == other else every)[other]
     return own
+
+
+def _waves(model: RobotModel, q: np.ndarray) -> np.ndarray:
+    """Waves e^{i k θ} (samples, N, harmonics) of every order k in the joints' positions θ at the motors' `q` (samples, n)."""
+    powers = [np.exp(1j * joint_positions(model, q))]
+    while len(powers) < max(model.drives.harmonics):
+        powers.append(powers[0] * powers[-1])
+    return np.stack([powers[order - 1] for order in model.drives.harmonics], axis=2)
 
 
 def _driving(model: RobotModel, q: np.ndarray, joint: int, other: int) -> np.ndarray:

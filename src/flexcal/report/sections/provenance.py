@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.metadata import version
 
+from flexcal import __version__
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block
 from flexcal.report.layout import Block as PageBlock
@@ -18,7 +18,7 @@ def provenance_section(
     command: str, seed: int | None, seconds: Mapping[str, float], origin: Mapping[str, str]
 ) -> Section:
     """Program version, seed, inputs with their hashes, the command, and how long each stage took."""
-    rows = [] if "program" in origin else [("program", f"flexcal {version('flexcal')}")]
+    rows = [] if "program" in origin else [("program", f"flexcal {__version__}")]
     rows += [("command", command)] if command else []
     rows += [("seed of all random numbers", str(seed))] if seed is not None else []
     files = [(name, value) for name, value in origin.items() if name.startswith("input.")]
