@@ -239,8 +239,8 @@ class _Evidence:
 
     def without(self, rows: np.ndarray) -> _Evidence:
         """The same of all but some readings, a mask (n,), which nothing explains."""
-        eye = np.eye(len(rows))[:, rows]
-        eye -= self.basis @ (self.basis.T @ eye)
+        eye = -self.basis @ self.basis[rows].T
+        eye[np.flatnonzero(rows), np.arange(eye.shape[1])] += 1.0
         basis = np.linalg.qr(eye)[0]
         y, columns = (a - basis @ (basis.T @ a) for a in (self.readings, self.columns))
         return replace(self, readings=y, columns=columns, basis=np.column_stack([self.basis, basis]))
