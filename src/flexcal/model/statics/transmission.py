@@ -19,7 +19,7 @@ def transmission_error(model: RobotModel, q: np.ndarray) -> np.ndarray:
     error = np.zeros((len(q), len(model.joints)))
     if waves.any():
         turned = _waves(model, q)
-        error += (waves[:, :, 0] * turned.imag + waves[:, :, 1] * turned.real).sum(axis=2)
+        error += (waves[:, :, 0] * np.imag(turned) + waves[:, :, 1] * np.real(turned)).sum(axis=2)
     for joint, other in np.argwhere(ratios):
         error[:, joint] += ratios[joint, other] * _driving(model, q, joint, other)
     return error
@@ -35,7 +35,7 @@ def transmission_columns(model: RobotModel, q: np.ndarray, twists: Sequence[tupl
         waves = _waves(model, q) if waves is None else waves
         order, wave = key.split("_")[1:]
         own = waves[:, joint, model.drives.harmonics.index(int(order))]
-        result[:, k] = own.imag if wave == "sin" else own.real
+        result[:, k] = np.imag(own) if wave == "sin" else np.real(own)
     return result
 
 
@@ -46,7 +46,7 @@ def transmission_slopes(model: RobotModel, q: np.ndarray) -> np.ndarray:
     if waves.any():
         orders = np.array(model.drives.harmonics)
         turned, (sine, cosine) = _waves(model, q), np.moveaxis(orders[:, None] * waves, 2, 0)
-        own *= 1 + (sine * turned.real - cosine * turned.imag).sum(axis=2)[:, :, None]
+        own *= 1 + (sine * np.real(turned) - cosine * np.imag(turned)).sum(axis=2)[:, :, None]
     every = motor_motion(model) if model.relations is None else model.relations.carry @ motor_motion(model)
     for joint, other in np.argwhere(ratios):
         own[:, joint] += ratios[joint, other] * (motor_motion(model) if joint == other else every)[other]
