@@ -87,6 +87,14 @@ nb::tuple nominal(const Robot& robot, nb::handle q_, int point) {
     return nb::make_tuple(position.release(), rotation.release());
 }
 
+Result beyond(const Robot& robot, nb::handle q_, int point) {
+    const std::size_t n = robot.model->joints.size();
+    const auto q = reals(q_, {any, n}, "q");
+    Buffer outside({q.shape(0)});
+    for (std::size_t s = 0; s < q.shape(0); ++s) outside.data[s] = robot.model->beyond(q.data() + n * s, point);
+    return outside.release();
+}
+
 // Commands (samples, n), NaN where there is none, with `call` for each.
 template <class Call>
 nb::tuple commands(const Robot& robot, std::size_t samples, const Contiguous<const double, 1>& payload, Call call) {
@@ -162,6 +170,8 @@ void bind_runtime(nb::module_& m) {
              "Position (samples, 3), rotation (samples, 3, 3) and status (samples,) of a point at q (samples, n), carrying payload (samples,) kg, "
              "NaN being the declared one, on the flanks (samples, n), or those of gravity for (0, n).")
         .def("nominal", &nominal, nb::arg("q"), nb::arg("point"), "Position (samples, 3) and rotation (samples, 3, 3) of the nominal robot.")
+        .def("beyond", &beyond, nb::arg("q"), nb::arg("point"),
+             "1 where q (samples, n) lies outside the joint ranges within which the calibration holds at the point, else 0 (samples,).")
         .def("compensate", &compensate, nb::arg("q"), nb::arg("point"), nb::arg("payload"),
              "Commands (samples, n) with which the tool stands where the nominal one would at q (samples, n), status (samples,) and the joint that "
              "it is about (samples,), -1 for none.")

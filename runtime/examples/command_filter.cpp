@@ -3,7 +3,7 @@
 //   command_filter robot.json < positions > commands
 //
 //   {"q": [0, -0.5, 1.6, 0, 0.6, 0]}                       a line in, with "point" and "payload" (kg) where they change
-//   {"status": "done", "command": [ ... ]}                 the line out
+//   {"status": "done", "command": [ ... ]}                 the line out, with "beyond": true where the calibration may not hold
 #include <cstdio>
 #include <iostream>
 #include <string>
@@ -47,7 +47,7 @@ class Filter {
             std::snprintf(number, sizeof number, "%.17g", value);
             text += (text.empty() ? "" : ", ") + std::string(number);
         }
-        return "{\"status\": \"done\", \"command\": [" + text + "]}";
+        return "{\"status\": \"done\", \"command\": [" + text + (model_.beyond(q_.data(), point_) ? "], \"beyond\": true}" : "]}");
     }
 
   private:

@@ -33,6 +33,9 @@ int flexcal_model_joints(const flexcal_model* model);
 const char* flexcal_model_joint_name(const flexcal_model* model, int joint);
 /* The index of a point by its name, -1 where there is none. */
 int flexcal_model_point(const flexcal_model* model, const char* name);
+/* 1 where q (n) lies outside the joint ranges within which the point's predicted error is not above three times that near the calibrated
+   poses, a warning; 0 elsewhere, and where the calibration does not say it. */
+int flexcal_beyond(const flexcal_model* model, const double* q, int point);
 
 flexcal_solver* flexcal_solver_new(const flexcal_model* model);
 void flexcal_solver_free(flexcal_solver* solver);

@@ -64,6 +64,8 @@ const char* flexcal_model_joint_name(const flexcal_model* model, int joint) {
 
 int flexcal_model_point(const flexcal_model* model, const char* name) { return model->model->point(name); }
 
+int flexcal_beyond(const flexcal_model* model, const double* q, int point) { return model->model->beyond(q, point); }
+
 flexcal_solver* flexcal_solver_new(const flexcal_model* model) { return new (std::nothrow) flexcal_solver(*model->model); }
 
 void flexcal_solver_free(flexcal_solver* solver) { delete solver; }

@@ -20,7 +20,9 @@ from flexcal import (
     export_robot,
     read_poses,
 )
+from flexcal.jobs.inputs import beyond_calibration
 from flexcal.jobs.serving import Answers
+from flexcal.kernels import RuntimeRobot
 
 SAYS = "the predicted error is above three times that near the calibrated poses"
 
@@ -78,3 +80,36 @@ def test_the_server_says_where_a_pose_is_beyond(narrow: CalibratedRobot) -> None
     )
     assert near == {"status": "done", "beyond": 0.0}
     assert far["status"] == "done" and 1e-5 < far["beyond"] < 0.1
+
+
+@pytest.mark.parametrize("reach", [0.1, 0.6, 2.0])
+def test_the_runtime_says_where_the_calibration_may_not_hold(
+    nominal: RobotModel, examples: Path, tmp_path: Path, reach: float
+) -> None:
+    """Wherever the predicted error says it, but for a few in a thousand; nowhere near the calibrated poses; and commands are the same."""
+    measured = poses_within(nominal, examples, reach, 60)
+    robot = calibrate(nominal, measured, terms=["kinematic"]).robot
+    text = export_robot(robot, tmp_path / "robot.json", "runtime").path.read_text()
+    document, arm = json.loads(text), RuntimeRobot.read(text)
+    q = np.random.default_rng(1).uniform(-np.pi, np.pi, (5000, 6))
+    around = np.concatenate([q, measured.q[0] + 0.2 * q])
+    beyond, predicted = arm.beyond(around, 0), beyond_calibration(robot, around) > 0
+    assert (predicted & (beyond == 0)).mean() < 3e-3
+    assert not arm.beyond(measured.q, 0).any()
+    holds = document["points"][0].pop("holds")
+    silent = RuntimeRobot.read(json.dumps(document))
+    assert not silent.beyond(around, 0).any()
+    if reach == 2.0:
+        assert holds is None and not beyond.any()
+        return
+    lower, upper = (
+        np.array([other if end is None else end for end in holds[key]])
+        for key, other in (("lower", -np.inf), ("upper", np.inf))
+    )
+    assert (beyond == ((around < lower) | (around > upper)).any(axis=1)).all()
+    assert 0.1 < beyond.mean() < 1.0
+    declared = np.full(len(around), np.nan)
+    for said, without in zip(
+        arm.compensate(around, 0, declared), silent.compensate(around, 0, declared), strict=True
+    ):
+        assert np.array_equal(said, without, equal_nan=True)

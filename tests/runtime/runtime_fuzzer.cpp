@@ -63,6 +63,7 @@ void use(std::string_view text, Random& random) {
         const std::size_t points = model->points.size();
         const int point = static_cast<int>(random() % 20 ? random() % points : points);
         (void)solver.set_payload(drawn(random));
+        (void)model->beyond(q.data(), point);
         Pose pose;
         const auto place = [&](const char* call, auto locate) {
             std::fill(pose.position, pose.position + 3, untouched), std::fill(pose.rotation, pose.rotation + 9, untouched);

@@ -266,6 +266,10 @@ def test_other_documents_are_refused(tx90l: RobotModel) -> None:
         ({"joints": document["joints"][:1] * 101}, "more than 100 joints"),
         ({"points": [document["points"][0] | {"rows": 5}]}, "point 1: 'rows' is neither 3 nor 6"),
         ({"points": [document["points"][0] | {"position": [0, 0, 1.1e20]}]}, "point 1: 'position' has a number beyond 1e20"),
+        ({"points": [document["points"][0] | {"holds": 1}]}, "point 1: 'holds' has not an end 'lower' for every joint"),
+        ({"points": [document["points"][0] | {"holds": {"lower": [0] * 6, "upper": [1] * 5}}]}, "'holds' has not an end 'upper' for every"),
+        ({"points": [document["points"][0] | {"holds": {"lower": ["0"] * 6}}]}, "'holds' has an end that is neither a number nor null"),
+        ({"points": [document["points"][0] | {"holds": {"lower": [1] * 6, "upper": [0] * 6}}]}, "'holds' has a lower end above"),
         ({"reach": -1}, "'reach' is negative"),
         ({"robot": "x" * (4 << 20)}, "more than 4194304 bytes"),
     ):  # fmt: skip

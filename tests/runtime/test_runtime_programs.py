@@ -20,6 +20,8 @@ from flexcal.kernels import RuntimeRobot
 from flexcal.model.robot import RobotModel
 
 Q = [0.3, 0.5, 1.2, 0.4, 0.9, -0.5]
+FAR = [0.6, *Q[1:]]
+HOLDS = {"smr": np.array([[-np.inf, *[-2.0] * 5], [0.5, *[np.inf] * 5]])}
 WARNINGS = "-Wall -Wextra -Wpedantic -Wshadow -Werror"
 COMPILER = shutil.which("g++")
 CMAKE = Path(sys.executable).with_name("cmake")
@@ -62,6 +64,7 @@ int main() {
         (void)solver.torque(moved, q, q, torque, true);
         (void)solver.compensate(moved, 0, command);
         (void)solver.set_payload(0.01 * k);
+        (void)model->beyond(moved, 0);
     }
     const long made = allocations - before;
     if (solver.set_payload(2) != flexcal::runtime::Status::ok) return 1;
@@ -104,7 +107,10 @@ def texts(tx90l: RobotModel) -> tuple[str, str]:
     """The elastic robot for the runtime, as JSON and as a header."""
     real = tx90l.with_values({"joint_2.offset": 1e-3, "joint_3.length_x": 4e-4, "joint_2.backlash": 5e-5})
     drives = TorqueModel.of(real).document()
-    return render_runtime(real, tx90l, drives).text, render_runtime(real, tx90l, drives, header=True).text
+    json_text, header = (
+        render_runtime(real, tx90l, drives, holds=HOLDS, header=header) for header in (False, True)
+    )
+    return json_text.text, header.text
 
 
 @pytest.fixture(scope="module")
@@ -188,6 +194,7 @@ def test_other_languages_load_the_shared_library(
     assert library.flexcal_set_payload(solver, ctypes.c_double(2.0)) == 0
     assert library.flexcal_compensate(solver, (ctypes.c_double * 6)(*Q), 0, command) == 0
     np.testing.assert_allclose(list(command), expected, rtol=0, atol=1e-12)
+    assert [library.flexcal_beyond(model, (ctypes.c_double * 6)(*q), 0) for q in (Q, FAR)] == [0, 1]
     kept = list(command)
     status = library.flexcal_compensate(solver, (ctypes.c_double * 6)(*([9.0] * 6)), 0, command)
     assert library.flexcal_describe(status) == b"a joint would be past its limit"
@@ -204,6 +211,7 @@ def test_the_filter_answers_every_line(built: Path, robot_file: Path, expected: 
         json.dumps({"q": Q, "payload": -1}),
         "[" * 5000,
         '{"q": [0, 0, 0, 0, 0, 1e999]}',
+        json.dumps({"q": FAR}),
         json.dumps({"q": Q}),
     ]
     answers = [
@@ -213,7 +221,8 @@ def test_the_filter_answers_every_line(built: Path, robot_file: Path, expected: 
     assert len(answers) == len(lines)
     np.testing.assert_allclose(answers[0]["command"], expected, rtol=0, atol=1e-12)
     np.testing.assert_allclose(answers[-1]["command"], expected, rtol=0, atol=1e-12)
-    for answer in answers[1:-1]:
+    assert answers[-2]["status"] == "done" and answers[-2]["beyond"] and "beyond" not in answers[-1]
+    for answer in answers[1:-2]:
         assert "command" not in answer and len(answer["status"]) > 10
     assert "joint" in answers[3]["status"]
 

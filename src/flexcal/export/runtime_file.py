@@ -22,11 +22,17 @@ _POSE = 6
 
 
 def render_runtime(
-    model: RobotModel, nominal: RobotModel, drives: Mapping[str, Any], *, header: bool = False
+    model: RobotModel,
+    nominal: RobotModel,
+    drives: Mapping[str, Any],
+    *,
+    holds: Mapping[str, np.ndarray] | None = None,
+    header: bool = False,
 ) -> RenderedModel:
     """The `model` that the robot really is, and the `nominal` one that says where its tool is to be, as the runtime reads them.
 
-    `drives` is the document of its `TorqueModel`.
+    `drives` is the document of its `TorqueModel`; `holds` are the joint ranges (2, n), rad or m, within which the calibration holds, of the
+    points at which it does not everywhere.
     With `header` the text is a C and C++ header with the document as the constant `flexcal_robot`.
     Raises `FlexcalError` for a robot without points, one whose joints follow others, and one that the runtime refuses.
     """
@@ -43,7 +49,7 @@ def render_runtime(
         "tilts_first": model.bearings == "before",
         "joints": [_joint(model, nominal, i) | drives["joints"][i] for i in range(len(model.joints))],
         "couplings": drives["couplings"],
-        "points": [_point(model, nominal, name) for name in model.points],
+        "points": [_point(model, nominal, name, (holds or {}).get(name)) for name in model.points],
         "payload": None
         if payload is None
         else {
@@ -134,7 +140,7 @@ def _limit(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def _point(model: RobotModel, nominal: RobotModel, name: str) -> dict[str, Any]:
+def _point(model: RobotModel, nominal: RobotModel, name: str, holds: np.ndarray | None) -> dict[str, Any]:
     joint, position, rotation = point_placement(model, name)
     _, nominal_position, nominal_rotation = point_placement(nominal, name)
     whole = len(set(model.moving(joint)) & set(model.motors)) >= _POSE
@@ -146,4 +152,10 @@ def _point(model: RobotModel, nominal: RobotModel, name: str) -> dict[str, Any]:
         "rotation": rotation.ravel().tolist(),
         "nominal_position": nominal_position.tolist(),
         "nominal_rotation": nominal_rotation.ravel().tolist(),
+        "holds": None
+        if holds is None
+        else {
+            end: [_limit(value) for value in row]
+            for end, row in zip(("lower", "upper"), holds.tolist(), strict=True)
+        },
     }

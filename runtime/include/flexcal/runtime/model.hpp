@@ -51,6 +51,7 @@ struct PointData {
     int joint;
     int rows;  // 6 where its whole pose can be had, 3 where its position can
     Hung real, nominal;
+    std::vector<double> lower, upper;  // joint ranges within which the calibration holds; empty where it does everywhere, or does not say
 };
 
 struct PayloadData {
@@ -101,6 +102,16 @@ struct Model {
         for (std::size_t i = 0; i < points.size(); ++i)
             if (points[i].name == name) return static_cast<int>(i);
         return -1;
+    }
+
+    // Whether joint positions q (n,) lie outside the ranges within which a point's predicted error is not above three times that near the
+    // calibrated poses. It warns, and changes no command; it is false where the calibration holds everywhere, or does not say where.
+    bool beyond(const double* q, int point) const {
+        if (point < 0 || point >= static_cast<int>(points.size())) return true;
+        const PointData& data = points[point];
+        for (std::size_t i = 0; i < data.lower.size(); ++i)
+            if (!(q[i] >= data.lower[i] && q[i] <= data.upper[i])) return true;
+        return false;
     }
 };
 
@@ -329,7 +340,30 @@ class ModelReader {
         return text(from, "name", data.name) && index(from, "joint", 0, count, data.joint) && index(from, "rows", 3, 7, data.rows) &&
                (data.rows == 3 || data.rows == 6 || fail("'rows' is neither 3 nor 6")) &&
                vector(from, "position", data.real.position) && turn(from, "rotation", data.real.rotation) &&
-               vector(from, "nominal_position", data.nominal.position) && turn(from, "nominal_rotation", data.nominal.rotation);
+               vector(from, "nominal_position", data.nominal.position) && turn(from, "nominal_rotation", data.nominal.rotation) &&
+               holds(from, count, data);
+    }
+
+    // Files of earlier exports do not say where the calibration holds.
+    bool holds(const Json& from, int count, PointData& data) {
+        const Json* member = from.member("holds");
+        if (!member || member->kind == Json::Kind::null) return true;
+        constexpr double infinite = std::numeric_limits<double>::infinity();
+        if (!ends(*member, "lower", count, -infinite, data.lower) || !ends(*member, "upper", count, infinite, data.upper)) return false;
+        for (int i = 0; i < count; ++i)
+            if (data.lower[i] > data.upper[i]) return fail("'holds' has a lower end above the upper one");
+        return true;
+    }
+
+    bool ends(const Json& from, const char* name, int count, double without, std::vector<double>& values) {
+        const Json* member = from.member(name);
+        const bool sized = member && member->kind == Json::Kind::list && member->items.size() == static_cast<std::size_t>(count);
+        for (int i = 0; sized && i < count; ++i) {
+            const Json& end = member->items[i];
+            if (end.kind != Json::Kind::number && end.kind != Json::Kind::null) return fail("'holds' has an end that is neither a number nor null");
+            values.push_back(end.kind == Json::Kind::null ? without : end.number);
+        }
+        return sized || fail(std::string("'holds' has not an end '") + name + "' for every joint");
     }
 
     bool payload(const Json& from, int count, PayloadData& data) {

@@ -30,6 +30,7 @@ from flexcal.export import (
 )
 from flexcal.files.formats import read_estimates
 from flexcal.jobs.deployment.actuator_export import actuator_remarks, identified_actuators, rendered_actuators
+from flexcal.jobs.deployment.holding_ranges import calibrated_ranges, holding_ranges
 from flexcal.jobs.inputs import (
     CalibratedRobot,
     beyond_calibration,
@@ -187,7 +188,11 @@ def export_robot(
     elif format == "runtime":
         drives = TorqueModel.of_blocks(probable, robot.blocks)
         rendered = render_runtime(
-            probable, robot.with_points, drives.document(), header=Path(path).suffix in _HEADERS
+            probable,
+            robot.with_points,
+            drives.document(),
+            holds=holding_ranges(robot, probable),
+            header=Path(path).suffix in _HEADERS,
         )
         rendered = replace(rendered, remarks=() if drives.identified else (_NOMINAL_TORQUES,))
     elif format == "isaac":
@@ -320,13 +325,10 @@ def poses_where_it_holds(robot: CalibratedRobot, model: RobotModel, *, near: boo
 
 def _partial_ranges(robot: CalibratedRobot, model: RobotModel) -> np.ndarray | None:
     """Lower and upper ends (2, n) of the joints at the poses of the calibration; None if unknown, or most of what the joints can."""
-    known = robot.blocks["calibration"].ranges if "calibration" in robot.blocks else {}
-    if not all(name in known for name in model.motor_names):
+    ranges, (lower, upper) = calibrated_ranges(robot, model), drawing_limits(model)
+    if ranges is None or (ranges[1] - ranges[0] > _WHOLE * (upper - lower)).all():
         return None
-    ranges = np.array([known[name] for name in model.motor_names]).T
-    lower, upper = drawing_limits(model)
-    whole = (ranges[1] - ranges[0] > _WHOLE * (upper - lower)).all()
-    return None if whole else np.clip(ranges, lower, upper)
+    return np.clip(ranges, lower, upper)
 
 
 def undetermined_zeros(robot: CalibratedRobot) -> tuple[int, ...]:
