@@ -13,9 +13,10 @@ import pytest
 from browser import studio
 from page_elements import WAIT, choose, fill, go_to, press, see
 
-from flexcal import read_poses
+from flexcal import ToolTargets, read_poses
 from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import write_poses
+from flexcal.jobs.deployment import compensate
 from flexcal.jobs.inputs import CalibratedRobot
 
 _TYPE_WHILE_BUSY = """([field, text]) => setTimeout(() => {
@@ -78,3 +79,31 @@ def test_targets_are_compensated_and_the_customer_gets_a_report(page: Any, tmp_p
         page.get_by_role("link", name="open certificate.html").wait_for(timeout=WAIT)
         see(page, "mm after compensation")
         assert "&lt;b&gt;UR5-7&lt;/b&gt;" in (folder / "certificate.html").read_text("utf-8")
+
+
+def test_targets_and_places_where_the_calibration_does_not_hold_are_marked(page: Any, tmp_path: Path) -> None:
+    """Calibrated on the 40 poses of a corner, by the predicted errors of `compensate`; also those of a map."""
+    pytest.importorskip("viser", reason="viser is absent: pip install 'flexcal[studio]'")
+    folder = calibrated_ur5.make(tmp_path / "ur5", nearest=40)
+    robot = CalibratedRobot.from_yaml(folder / "robot.yaml", folder / "calibration")
+    poses = read_poses(folder / "random.csv", robot.model)
+    targets = ToolTargets(poses.pose, poses.target, q=poses.q)
+    far = {str(pose) for pose in poses.pose[compensate(robot, targets).extrapolated > 0]}
+    assert 3 < len(far) < 12
+    header = {"pose": poses.pose} | {f"q{k + 1}": poses.q[:, k] for k in range(6)}
+    pl.DataFrame(header).write_csv(folder / "targets.csv")
+    with studio(folder) as running:
+        page.goto(running.url)
+        go_to(page, "Verify")
+        press(page, "Compensate")
+        see(page, "flexcal compensate robot.yaml targets.csv")
+        press(page, "Compensate the file")
+        see(page, f"at {len(far)} of {len(poses)} targets the predicted error is above three times")
+        rows = page.locator("table", has_text="pose beyond").locator("tbody tr td:first-child")
+        assert set(rows.all_inner_texts()) == far
+        press(page, "Map")
+        choose(page, "Where", "the poses of random.csv")
+        press(page, "Compute the map")
+        see(page, "worst places")
+        marked = page.locator("table", has_text="worst places").locator("tbody tr", has_text="!")
+        assert 0 < marked.count() <= len(far)

@@ -160,7 +160,10 @@ def test_the_plane_hides_what_is_before_it(scene: viser.SceneApi) -> None:
     np.testing.assert_allclose(scene._handle_from_node_name["/volume"].points, [[0, 2, 0]])
     volume.show(np.full(4, 0.1))
     assert volume.mask.tolist() == [False, False, True, True]
+    volume.restrict(np.array([True, True, True, False]))
+    assert volume.mask.tolist() == [False, False, True, False]
     volume.uncut()
+    volume.restrict(None)
     assert volume.mask.all()
 
 

@@ -50,6 +50,7 @@ class AccuracyVolume:
         space = np.cbrt(np.prod(np.maximum(extent, 1e-3)) / max(len(self.points), 1))
         self._size = float(0.6 * space) if size is None else size
         self._plane: tuple[int, float, bool] | None = None
+        self._only: np.ndarray | None = None
         self._cloud: viser.PointCloudHandle
         self._draw()
 
@@ -57,6 +58,8 @@ class AccuracyVolume:
     def mask(self) -> np.ndarray:
         """Which points (N,) are drawn."""
         finite = np.isfinite(self.values) & np.isfinite(self.points).all(axis=1)
+        if self._only is not None:
+            finite &= self._only
         if self._plane is None:
             return finite
         axis, position, flipped = self._plane
@@ -77,6 +80,11 @@ class AccuracyVolume:
     def uncut(self) -> None:
         """Show all points."""
         self._plane = None
+        self._draw()
+
+    def restrict(self, rows: np.ndarray | None) -> None:
+        """Hide the points outside a mask (N,); show them again with None."""
+        self._only = rows
         self._draw()
 
     def remove(self) -> None:

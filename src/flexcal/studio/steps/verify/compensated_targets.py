@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.jobs.inputs import CalibratedRobot, is_station_identified
 from flexcal.studio.project import CALIBRATION
-from flexcal.studio.scene import TARGET, Points
+from flexcal.studio.scene import BLOCKED, TARGET, Points
 from flexcal.studio.steps.verify.corrected_command import CorrectedCommand, TypedTarget
 from flexcal.studio.steps.verify.target_file import TargetFile
 from flexcal.studio.steps.verify.target_files import target_files
@@ -164,7 +164,8 @@ class CompensatedTargets(Step):
             self._tell(found, based=not target.station)
         window.robot.pose(found.q)
         window.robot.ghost(found.nominal)
-        self._mark = Points(window.scene, found.position[None], TARGET, name="/target", size=0.03)
+        colour = BLOCKED if found.beyond else TARGET
+        self._mark = Points(window.scene, found.position[None], colour, name="/target", size=0.03)
 
     def _tell(self, found: CorrectedCommand, *, based: bool) -> None:
         assert self._robot is not None
@@ -192,7 +193,7 @@ class CompensatedTargets(Step):
                     f"With the corrected one its predicted error is {found.mean / MILLIMETRE:.3f} mm on average, "
                     f"{found.p95 / MILLIMETRE:.3f} mm in 95 of 100 cases, from the uncertainty of the calibration"
                     + (", in the base as it is fitted to the measured points." if based else "."),
-                    "good",
+                    "warning" if found.beyond else "good",
                 )
             )
         for remark in found.remarks:

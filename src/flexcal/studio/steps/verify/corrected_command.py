@@ -71,6 +71,8 @@ class CorrectedCommand:
         Where the calibrated robot has the point (3,), m, base frame.
     mean, p95 : float or None
         Predicted mean error there and its 95 % bound, m; None for a point that was not measured.
+    beyond : bool
+        Whether the predicted error is above three times that near the calibrated poses.
     remarks : tuple of str
         What makes it doubtful.
     """
@@ -81,6 +83,7 @@ class CorrectedCommand:
     position: np.ndarray
     mean: float | None
     p95: float | None
+    beyond: bool
     remarks: tuple[str, ...]
 
     @classmethod
@@ -114,5 +117,6 @@ class CorrectedCommand:
             at.position[0],
             mean,
             p95,
+            bool(found.extrapolated[0]),
             tuple(remarks),
         )

@@ -15,6 +15,7 @@ from flexcal.units import MILLIMETRE
 _KEY = "map-"
 """Beginning of the key of a pose of the map; what follows is its row."""
 _BEFORE, _MEAN, _BOUND = "before calibration", "calibrated, mean", "calibrated, 95 % bound"
+_BEYOND = "predicted error above three times that near the calibrated poses"
 _NO_CUT = "none"
 _STEP = 5
 """Of the cutting plane, mm."""
@@ -32,10 +33,12 @@ class MapView:
         Where it is shown; numbers at the current place of its GUI.
     map : MapTable
         The map.
+    beyond : ndarray
+        Which places (N,) have a predicted error above three times that near the calibrated poses.
     """
 
-    def __init__(self, window: Window, map: MapTable):
-        self._window, self._map = window, map
+    def __init__(self, window: Window, map: MapTable, beyond: np.ndarray):
+        self._window, self._map, self._beyond = window, map, beyond
         predicted = map.predicted
         self._errors = {_MEAN: predicted.mean / MILLIMETRE, _BOUND: predicted.p95 / MILLIMETRE}
         if map.uncalibrated is not None:
@@ -61,6 +64,12 @@ class MapView:
             "Plane / mm", min=-1, max=1, step=_STEP, initial_value=0, visible=False
         )
         self._flipped = gui.add_checkbox("Other side", True, visible=False)
+        self._only = gui.add_checkbox(
+            "Only beyond",
+            False,
+            hint=f"places with a {_BEYOND}",
+            visible=bool(beyond.any()),
+        )
         self._table = gui.add_html("")
         self._volume = AccuracyVolume(window.scene, predicted.position, self._errors[self._error.value])
         for choice in (self._error, self._shared):
@@ -68,6 +77,7 @@ class MapView:
         self._axis.on_update(lambda _: window.post(self._turn))
         for handle in (self._position, self._flipped):
             handle.on_update(lambda _: window.post(self._cut))
+        self._only.on_update(lambda _: window.post(self._restrict))
         self._recolour()
         self._turn()
 
@@ -77,11 +87,13 @@ class MapView:
         rows = {}
         for row in self._worst.tolist():
             place = ", ".join(f"{1000 * value:.0f}" for value in predicted.position[row])
-            rows[f"{_KEY}{row}"] = (place, *(f"{values[row]:.3f}" for values in self._errors.values()))
+            *errors, bound = (f"{values[row]:.3f}" for values in self._errors.values())
+            rows[f"{_KEY}{row}"] = (place, *errors, f"{bound} !" if self._beyond[row] else bound)
             if chosen == f"{_KEY}{row}":
                 self._window.robot.pose(predicted.q[row])
         heads = ("worst places x, y, z / mm", *(name.removeprefix("calibrated, ") for name in self._errors))
-        self._table.content = picked_rows(heads, rows, chosen)
+        marked = paragraph(f"!: {_BEYOND}.", "faint") if self._beyond[self._worst].any() else ""
+        self._table.content = picked_rows(heads, rows, chosen) + marked
 
     def close(self) -> None:
         """Remove the volume from the scene."""
@@ -112,6 +124,9 @@ class MapView:
         self._position.min, self._position.max = low, high
         self._position.value = _STEP * round((low + high) / 2 / _STEP)
         self._cut()
+
+    def _restrict(self) -> None:
+        self._volume.restrict(self._beyond if self._only.value else None)
 
     def _cut(self) -> None:
         if self._axis.value != _NO_CUT:

@@ -81,4 +81,9 @@ def _outcome(document: dict[str, Any]) -> str:
         rows = [(str(item["pose"]), item["reason"]) for item in document["refused"][:_LISTED]]
         parts.append(table(("pose", "why it has no command"), rows, height="10em"))
     parts += [paragraph(remark, "warning") for remark in document["remarks"]]
+    if document["extrapolated"]:
+        rows = [
+            (str(item["pose"]), f"{item['predicted_mm']:.3f}") for item in document["extrapolated"][:_LISTED]
+        ]
+        parts.append(table(("pose beyond", "predicted error / mm"), rows, height="10em"))
     return "".join(parts)

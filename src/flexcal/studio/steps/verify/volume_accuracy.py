@@ -5,7 +5,7 @@ from __future__ import annotations
 from flexcal.errors import FlexcalError
 from flexcal.jobs.accuracy import MapTable
 from flexcal.jobs.calibration import outside_ranges
-from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.jobs.inputs import CalibratedRobot, beyond_calibration
 from flexcal.studio.commands import command_line
 from flexcal.studio.project import CALIBRATION, MAP
 from flexcal.studio.steps.verify.fresh_files import fresh_files
@@ -101,6 +101,7 @@ class VolumeAccuracy(Step):
                 table = MapTable.read(path)
                 robot = CalibratedRobot.from_yaml(window.project.robot_file, estimates)
                 remark = outside_ranges(robot, table.predicted.q)
+                beyond = beyond_calibration(robot, table.predicted.q) > 0
             except FlexcalError as problem:
                 window.gui.add_html(paragraph(window.project.told(str(problem)), "bad"))
                 return
@@ -110,6 +111,6 @@ class VolumeAccuracy(Step):
                 )
             if remark:
                 window.gui.add_html(paragraph(remark, "warning"))
-            self._view = MapView(window, table)
+            self._view = MapView(window, table, beyond)
             if path.with_suffix(".html").is_file():
                 window.gui.add_html(file_link(f"{MAP}.html", "open the page of the map"))
