@@ -21,13 +21,15 @@ CERTAIN = 3.0
 class ResponseBearings:
     """Comparison of fits with bearings that tilt `before` and `after` the joint's rotation, from frequency responses.
 
-    `declared` are those of robot.yaml, None where it has none. `statistic` is Vuong's over clusters of neighbouring lines, positive where
-    `before` fits better; `preferred` the clearly better ones, None where both fit about as well.
+    `declared` are those of robot.yaml, None where it has none. `statistic` is Vuong's over clusters of neighbouring lines, or where errors
+    of the model are `coherent` of an octave, positive where `before` fits better; `preferred` the clearly better ones, None where both fit
+    about as well.
     """
 
     declared: Bearings | None
     reduced_chi2: Mapping[Bearings, float]
     statistic: float
+    coherent: bool = False
 
     @classmethod
     def compare(
@@ -45,7 +47,7 @@ class ResponseBearings:
             "before": before.estimate.reduced_chi2,
             "after": after.estimate.reduced_chi2,
         }
-        return cls(declared, chi2, statistic)
+        return cls(declared, chi2, statistic, coherent)
 
     @property
     def preferred(self) -> Bearings | None:
@@ -71,10 +73,11 @@ class ResponseBearings:
 
     @property
     def share_of_other(self) -> float:
-        """Probability that those not taken are the better ones where nothing is declared, by the normal distribution of the statistic:
-        their weight in a mean of both (Buckland et al. 1997).
+        """Probability that those not taken are the true ones where nothing is declared: their weight in a mean of both (Buckland et al.
+        1997). It follows from the normal distribution of the statistic, unless errors of the model are `coherent`: they prefer wrong
+        axes about as often as right ones, as long as the preference is not significant.
         """
-        return NormalDist().cdf(-abs(self.statistic))
+        return 0.5 if self.coherent else NormalDist().cdf(-abs(self.statistic))
 
     @property
     def contradicted(self) -> bool:
@@ -89,11 +92,12 @@ def with_fitting_bearings(
     complete: Callable[[RobotModel, ResponseFit], tuple[RobotModel, ResponseFit]],
 ) -> tuple[RobotModel, ResponseFit, ResponseBearings | None, ResponseFit | None]:
     """Fit completed by `complete` with the bearings to be used, from the robot's `first` fit or one with the other bearings; the
-    comparison; and where that is undecided the completed fit with the others.
+    comparison; and where that is undecided the completed fit with the others. From a fit with other axes `complete` searches with the
+    springs that the robot has.
 
     Where completing the better one adds springs, bearings were not all that was missing: the other is then fitted with the same springs,
-    from there, before they are compared; where drives slip, which wrong axes take up, the other is completed by itself as well. There is
-    no comparison for a robot without bearings, or where one with the others has no fit.
+    from there, before they are compared; where drives slip, which wrong axes take up, from a search of its own as well. There is no
+    comparison for a robot without bearings, or where one with the others has no fit.
     """
     if not model.has_bearings:
         return *complete(model, first), None, None
@@ -118,13 +122,11 @@ def with_fitting_bearings(
         worse: Bearings = "before" if better == "after" else "after"
         robot = robot.with_bearings(worse)
         try:
-            ended[worse] = robot, fit_responses(robot, data, fit.x)
+            ended[worse] = (
+                complete(robot, fit) if data.hysteresis else (robot, fit_responses(robot, data, fit.x))
+            )
         except FlexcalError:
             return *ended[better], comparison, None
-        if data.hysteresis:
-            ended[worse] = min(
-                ended[worse], complete(*begun[worse]), key=lambda found: found[1].estimate.reduced_chi2
-            )
         comparison = compared(ended[model.bearings][1], ended[other.bearings][1])
     taken = comparison.taken
     robot, fit = ended.get(taken) or complete(*begun[taken])

@@ -28,8 +28,13 @@ from flexcal.progress import Progress, silent
 ROUNDS = 2
 """Number of fits, each with model error and reference motion evaluated at the last optimum."""
 
+MEANS = 2
+"""Number of further fits where drives slip, each followed by the mean of its optimum and where it was evaluated."""
+
 FINE, COARSE = 1e-6, 1e-3
 """Tolerances of the last fit, and of the preceding ones."""
+SLIPPING = 1e-4
+"""Tolerance of the last fit where drives slip, a hundredth of a standard deviation: another evaluation moves the optimum farther."""
 COARSE_ITERATIONS = 60
 """Largest number of iterations of the preceding fits: with a wrong model they may continue for hundreds without result."""
 
@@ -73,9 +78,11 @@ class ResponseData:
 class ResponseFit:
     """Result of a fit of one robot: `estimate` with the posterior covariance of `problem`.
 
-    `effects` are those of the experiment in every pose, added to what `residual.model` predicts at rest; `error` what the model leaves out.
+    `effects` are those of the experiment in every pose, added to what `residual.model` predicts at rest; `error` what the model leaves out;
+    both were evaluated at the coordinates `about` (p,).
     """
 
+    about: np.ndarray
     residual: ResponseResidual
     effects: tuple[ExperimentEffect, ...]
     error: ModelError | None
@@ -130,8 +137,18 @@ def first_fit(model: RobotModel, data: ResponseData, x: np.ndarray) -> ResponseF
 
 
 def final_fit(model: RobotModel, data: ResponseData, first: ResponseFit) -> ResponseFit:
-    """Fit from the optimum of `first`, at which model error and experiment effects are evaluated, if there are any."""
-    return _fit(model, data, first.x, FINE) if data.effects else first
+    """Fit from the optimum of `first`, at which model error and experiment effects are evaluated, if there are any.
+
+    Where drives slip, the optimum of one evaluation is no fixed point of the next, but lies beyond it: the means of both are.
+    """
+    if not data.effects:
+        return first
+    if not data.hysteresis:
+        return _fit(model, data, first.x, FINE)
+    x = first.x
+    for _ in range(MEANS):
+        x = (x + _fit(model, data, x, COARSE).x) / 2
+    return _fit(model, data, x, SLIPPING)
 
 
 def reweighted_fit(model: RobotModel, data: ResponseData, first: ResponseFit) -> ResponseFit:
@@ -156,7 +173,7 @@ def _fit(model: RobotModel, data: ResponseData, x: np.ndarray, tolerance: float)
     problem = _problem(residual, error, parameters, prior)
     iterations = COARSE_ITERATIONS if tolerance == COARSE else 200
     fitted = solve(problem, starts=x[None], tolerance=tolerance, max_iterations=iterations)
-    return ResponseFit(residual, tuple(effects), error, problem, fitted)
+    return ResponseFit(x, residual, tuple(effects), error, problem, fitted)
 
 
 def _problem(

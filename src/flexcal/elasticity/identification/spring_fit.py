@@ -165,6 +165,8 @@ def fit_springs(
     progress("fitting", 0.3)
 
     def completed(robot: RobotModel, begun: ResponseFit) -> tuple[RobotModel, ResponseFit]:
+        if begun.residual.model.robot.bearings != robot.bearings:
+            return robot, _searched_fit(robot, data, search, rng, progress, near=begun.x)
         candidates = CompliantHeldJoints.of(robot, responses)
         fit = None
         if candidates.is_supported(robot, data, begun):
@@ -286,10 +288,15 @@ def _with_held_joints(
 
 
 def _searched_fit(
-    model: RobotModel, data: ResponseData, search: Search, rng: np.random.Generator, progress: Progress
+    model: RobotModel,
+    data: ResponseData,
+    search: Search,
+    rng: np.random.Generator,
+    progress: Progress,
+    near: np.ndarray | None = None,
 ) -> ResponseFit:
     """Fit of a robot with braked elastic joints: first with rotors at rest and, if that leaves a misfit, with rotors that move with the
-    arm because position loops hold them; the better of both.
+    arm because position loops hold them; the better of both, and of a fit from the coordinates `near` (p,) where there are any.
     """
     parameters, prior = data.parameters(model)
     x = search.find(
@@ -308,6 +315,8 @@ def _searched_fit(
         moving = [(item.name, rotors.get(item.name, item.value)) for item in parameters.with_coordinates(x)]
         second = first_fit(model, data, parameters.coordinates(dict(moving)))
         first = min(first, second, key=lambda fit: fit.estimate.reduced_chi2)
+    if near is not None:
+        first = min(first, first_fit(model, data, near), key=lambda fit: fit.estimate.reduced_chi2)
     return final_fit(model, data, first)
 
 
@@ -341,7 +350,8 @@ def _widened(
         wider = np.maximum(wider, misfit_std(fit, misfit))
     if data.hysteresis:
         scatter = jackknife_std(fit)
-        wider = np.maximum(std, wider) if scatter is None else np.hypot(np.maximum(std, wider), scatter)
+        wider = np.hypot(np.maximum(std, wider), fit.x - fit.about)
+        wider = wider if scatter is None else np.hypot(wider, scatter)
         drives = [name.endswith(".drive.stiffness") for name in fitted.parameters.names]
         wider = np.maximum(wider, np.where(drives, UNSLIPPED, 0.0))
     factor = np.divide(wider, std, out=np.ones_like(std), where=std > 0)

@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.elasticity.response_model.prediction import PoseModel, ResponseModel
 from flexcal.elasticity.time_periodic import FrictionPulses, ReferenceMotion, reference_shift
 from flexcal.frequency.periodic import FrequencyResponse
-from flexcal.model.vibration import drive_stretch, linearise, transfer_matrix
+from flexcal.model.vibration import linearise
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +53,5 @@ def _effect(
     pulses = FrictionPulses.of(system, pose.frequencies_hz, reference, strength)
     opening = pose.opening(model.robot, natural)
     moving = reference_shift(robot, pose.q, payload, pose.frequencies_hz, reference, opening, sensors)
-    uneven = pose.uneven_slip(model.robot, natural)
-    if uneven is not None:
-        pull = drive_stretch(robot, system, held=True)
-        added = np.einsum("dg,lg,eg->lde", pull, uneven, pull)
-        responses = [transfer_matrix(system, pose.frequencies_hz, added=k).response for k in (added, 0.0)]
-        moving = moving + responses[0] - responses[1]
     factor = pose.measured(natural)
     return ExperimentEffect((moving + pulses.shift) * factor, pulses.shift_by_form() * factor[..., None])

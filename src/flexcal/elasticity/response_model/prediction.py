@@ -29,7 +29,7 @@ from flexcal.model.robot import (
     sensitivity_name,
     sensor_delay_name,
 )
-from flexcal.model.vibration import ElasticArm, linearise, transfer_matrix
+from flexcal.model.vibration import ElasticArm, drive_stretch, linearise, transfer_matrix
 
 _MOUNTING_STEP = 1e-6
 """Step, m or rad, of the difference quotients by mounting errors, in which readings are linear but for the length of the direction."""
@@ -227,15 +227,25 @@ class PoseModel:
         stiffness = np.array([self.at_no_load(robot, natural, joint)[0] for joint in self.slip])
         return share, twist * stiffness / self.linear
 
-    def uneven_slip(self, robot: RobotModel, natural: np.ndarray) -> np.ndarray | None:
+    def uneven_slip(
+        self, robot: RobotModel, natural: np.ndarray
+    ) -> tuple[np.ndarray, dict[str, dict[int, np.ndarray]]]:
         """Complex stiffness (L, D) N m/rad at the lines of the slipping springs of all elastic drives beyond their mean stiffness and
-        damping.
+        damping; by joint its derivatives (L,) by the parameters that change it, in estimation coordinates. Without such springs D is 0.
         """
         if self.slipping is None:
-            return None
+            return np.zeros((len(self.frequencies_hz), 0)), {}
         share, limits = self._slip(robot, natural)
         stiffness = [self.at_no_load(robot, natural, joint)[0] for joint in self.slip]
-        return share * stiffness * self.slipping.at(limits, self.frequencies_hz)
+        added, slopes = (share * stiffness * gain for gain in self.slipping.at(limits, self.frequencies_hz))
+        by = {
+            joint: {of: a, twist: b}
+            for (joint, (of, twist)), a, b in zip(self.slip.items(), added.T, slopes.T, strict=True)
+        }
+        for joint, (of, twist) in self.slip.items():
+            if (drive := self.robot_names.get(_drive(joint)[0])) is not None:
+                by[joint][drive] = by[joint][of] + by[joint][twist]
+        return added, by
 
     def _softer(self, natural: np.ndarray) -> np.ndarray:
         half_width = np.zeros(self.backlash_compliance.shape[1])
@@ -394,7 +404,11 @@ class ResponseModel:
         sensors = pose.placed(values)
         system = linearise(robot, pose.q, payload, derivatives=names, sensors=sensors, like=self._arm)
         s = 2j * np.pi * pose.frequencies_hz
-        moved = transfer_matrix(system, pose.frequencies_hz)
+        uneven, by_slip = pose.uneven_slip(self.robot, values)
+        pull = drive_stretch(robot, system, held=True)[:, : uneven.shape[1]]
+        moved = transfer_matrix(
+            system, pose.frequencies_hz, added=np.einsum("dg,lg,eg->lde", pull, uneven, pull)
+        )
         response, change = moved.response, moved.derivatives
         factor = pose.measured(values)
         response = response * factor
@@ -411,6 +425,8 @@ class ResponseModel:
             by_stiffness, by_damping = (change[..., names.index(name)] for name in _drive(joint))
             for number, (stiffer, damped) in drive.derivatives.items():
                 blocks[number] = by_stiffness * stiffer + by_damping * damped
+            for number, slope in by_slip.get(joint, {}).items():
+                blocks[number] += by_stiffness * slope[:, None, None]
         for axis in np.flatnonzero(pose.delays >= 0):
             number = int(pose.delays[axis])
             blocks[number] = np.zeros_like(response)

@@ -55,7 +55,8 @@ class SlippingSprings:
         slip = np.zeros((len(time), len(LIMITS), size.shape[1]))
         lower, upper = -LIMITS[:, None], LIMITS[:, None]
         for k, change in enumerate(np.diff(moved, axis=0), start=1):
-            np.clip(slip[k - 1] + change, lower, upper, out=slip[k])
+            extension = np.add(slip[k - 1], change, out=slip[k])
+            np.minimum(np.maximum(extension, lower, out=extension), upper, out=extension)
         kept = slice(len(time) // (CYCLES + 1), None)  # the element forgets where it began
         small, rate, slip, turning = small[kept], rate[kept], slip[kept], turning[kept]
         cell = (len(slow) * at[kept]).astype(int)
@@ -93,10 +94,13 @@ class SlippingSprings:
         at, turn = np.arange(phases) / phases, np.arange(PHASES) / PHASES
         return np.stack([[np.interp(at, turn, x, period=1.0) for x in y.T] for y in along]).swapaxes(1, 2)
 
-    def at(self, limits: np.ndarray, frequencies_hz: np.ndarray) -> np.ndarray:
-        """Complex gains (L, E) at `frequencies_hz` (L,) less what the mean is."""
-        lines = _interpolated(self.lines, limits)[0]
-        return np.stack([np.interp(frequencies_hz, self.frequencies_hz, x) for x in lines.T], axis=1)
+    def at(self, limits: np.ndarray, frequencies_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Complex gains (L, E) at `frequencies_hz` (L,) less what the mean is, and their derivatives (L, E) by the logarithm."""
+        gains, slopes = (
+            np.stack([np.interp(frequencies_hz, self.frequencies_hz, x) for x in lines.T], axis=1)
+            for lines in _interpolated(self.lines, limits)
+        )
+        return gains, slopes
 
 
 def _interpolated(gains: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

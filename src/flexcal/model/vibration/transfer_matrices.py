@@ -38,14 +38,15 @@ def transfer_matrix(
     count, size = system.inputs, len(system.mass)
     at = s[:, None, None]
     forces = np.broadcast_to(np.eye(size, count), (len(s), size, count))
-    moved = np.linalg.solve(at**2 * system.mass + at * system.damping + system.stiffness + added, forces)
+    dynamics = at**2 * system.mass + at * system.damping + system.stiffness + added
+    moved = np.linalg.solve(dynamics, forces)
     names = tuple(system.derivatives)
     response, change = at**2 * moved[:, :count], _derivatives(system, names, s, moved)
     if system.sensed is not None:
         rows = system.sensed.at(s)
         response = np.concatenate([response, rows @ moved], axis=1)
         change = np.concatenate(
-            [change, _sensed_derivatives(system, system.sensed, names, s, moved, rows)], axis=1
+            [change, _sensed_derivatives(system, system.sensed, names, s, dynamics, moved, rows)], axis=1
         )
     return TransferMatrix(response, names, change)
 
@@ -82,14 +83,13 @@ def _sensed_derivatives(
     sensed: SensorOutputs,
     names: tuple[str, ...],
     s: np.ndarray,
+    dynamics: np.ndarray,
     moved: np.ndarray,
     rows: np.ndarray,
 ) -> np.ndarray:
     """∂(o X) = ∂o X − Y (s² ∂M + s ∂D + ∂K) X (lines, S, E, c), with Y = o A⁻¹, A being symmetric."""
     if not names:
         return np.zeros((len(s), len(sensed), system.inputs, 0), dtype=complex)
-    at = s[:, None, None]
-    dynamics = at**2 * system.mass + at * system.damping + system.stiffness
     pulled = np.linalg.solve(dynamics, np.swapaxes(rows, 1, 2))  # A⁻¹ oᵀ (lines, E + d, S)
     parts = [np.array(kind) for kind in zip(*system.derivatives.values(), strict=True)]
     a, b = np.nonzero(np.logical_or.reduce([np.any(part != 0, axis=0) for part in parts]))
