@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -9,12 +10,14 @@ import numpy as np
 import pinocchio as pin
 import polars as pl
 import pytest
+from stranger_arm import rigid, rodrigues
 from yielding_arm import YieldingArm, touches
 
 from flexcal import CalibratedRobot
 from flexcal.calibration.accuracy import predicted_rms
 from flexcal.calibration.measurement import propagation
 from flexcal.export.urdf import render_urdf
+from flexcal.kernels import RuntimeRobot
 from flexcal.model.kinematics import point_kinematics
 
 OFFS = [0.0, 0.002, 0.015]
@@ -85,6 +88,75 @@ def tips(urdf: str, q: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
+def turned(axis: str, angle: float) -> np.ndarray:
+    return rigid(rodrigues(np.eye(3)["xyz".index(axis)], angle), np.zeros(3))
+
+
+def moved(axis: str, by: float) -> np.ndarray:
+    return rigid(np.eye(3), by * np.eye(3)["xyz".index(axis)])
+
+
+def placed(frame: dict[str, float]) -> np.ndarray:
+    """Trans(x, y, z) Rz(yaw) Ry(pitch) Rx(roll), of what is named of it."""
+    turns = [
+        turned(axis, frame.get(name, 0.0)) for name, axis in (("yaw", "z"), ("pitch", "y"), ("roll", "x"))
+    ]
+    at = np.linalg.multi_dot([np.eye(4), *turns])
+    at[:3, 3] = [frame.get(axis, 0.0) for axis in "xyz"]
+    return at
+
+
+def table(path: Path, column: str) -> dict[str, dict[str, float]]:
+    """Values of an exported table, by joint and parameter."""
+    found: dict[str, dict[str, float]] = {}
+    for row in pl.read_csv(path, comment_prefix="#").iter_rows(named=True):
+        found.setdefault(row["joint"], {})[row["parameter"]] = row[column]
+    return found
+
+
+def exported_tips(
+    run, arm: YieldingArm, robot: Path, q: np.ndarray, declared: np.ndarray
+) -> dict[str, np.ndarray]:
+    """The tip (N, 3), m, by the table, the offsets, the JSON document and the runtime's file, read as their comments and pages say.
+
+    The tip is `declared` in robot.yaml.
+    """
+
+    def export(form: str, name: str, *options: str) -> Path:
+        outcome = run("export", form, robot, "--out", robot.with_name(name), *options)
+        assert outcome.status == 0, outcome.err
+        assert "at 2000 of 2000" not in outcome.out or "where the calibration holds" not in outcome.out
+        return robot.with_name(name)
+
+    rows, all_at = table(export("mdh", "mdh.csv", "--point", "tip"), "calibrated"), []
+    base, tool = placed(rows.pop("base")), placed(rows.pop("tool"))
+    for own in q:
+        at = base
+        for row, angle in zip(rows.values(), own, strict=True):
+            across = [turned("x", row["alpha"]), moved("x", row["a"]), turned("y", row["beta"])]
+            at = np.linalg.multi_dot([at, *across, turned("z", row["theta"] + angle), moved("z", row["d"])])
+        all_at.append((at @ tool)[:3, 3])
+    found = {"mdh": np.array(all_at)}
+    rows = table(export("offsets", "offsets.csv", "--point", "tip"), "value")
+    base, tool = placed(rows.pop("base")), placed(rows.pop("tool"))
+    offsets = np.array([row["offset"] for row in rows.values()])
+    there = arm.at(q + offsets, declared + tool[:3, 3], true=False)
+    found["offsets"] = there @ base[:3, :3].T + base[:3, 3]
+    document = json.loads(export("json", "robot.json").read_text())
+    all_at = []
+    for own in q:
+        at = np.eye(4)
+        for joint, angle in zip(document["joints"], own, strict=True):
+            turn = rodrigues(np.array(joint["axis"]), angle)
+            at = at @ np.array(joint["placement"]["matrix"]) @ rigid(turn, np.zeros(3))
+        all_at.append((at @ np.array(document["points"]["tip"]["placement"]["matrix"]))[:3, 3])
+    found["json"] = np.array(all_at)
+    runtime = RuntimeRobot.read(export("runtime", "runtime.json").read_text())
+    tip, none = runtime.point_names.index("tip"), np.full(len(q), np.nan)
+    found["runtime"] = runtime.forward(q, tip, none, np.zeros((0, arm.n)))[0]
+    return found
+
+
 def said_by_others(run, arm: YieldingArm, robot: Path) -> dict[str, np.ndarray]:
     """The same in other verbs: where the tip is by the calibrated geometry and by the exported URDF, what a filtered program commands, and
     where a work object lies, m.
@@ -125,7 +197,7 @@ def said_by_others(run, arm: YieldingArm, robot: Path) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("first", [False, True], ids=["after", "before"])
 def test_the_tip_is_the_same_wherever_the_reflector_was_declared(tmp_path: Path, run, first: bool) -> None:
     """Calibrated, touched, and the line copied before or after the reflector's, which `tool.length_x` stays the error of."""
-    places, reached, others = [], [], []
+    places, reached, others, files = [], [], [], []
     q = YieldingArm().postures(20, np.random.default_rng(8))
     for off in OFFS:
         for written in (False, True):
@@ -136,11 +208,16 @@ def test_the_tip_is_the_same_wherever_the_reflector_was_declared(tmp_path: Path,
                 [point_kinematics(model, q, point=name, jacobians=False).position for name in ("tip", "smr")]
             )
             others.append(said_by_others(run, arm, robot))
+            if off == OFFS[-1] or not files:
+                files.append(exported_tips(run, arm, robot, q[:10], places[-1]))
+                rigid_tips = tips(render_urdf(model).text, q[:10])
+                assert np.abs(files[-1]["json"] - rigid_tips).max() < 1e-8
             assert np.median(missed(run, arm, robot)) < 3e-4
     assert np.abs(np.array(places) - places[0]).max() < 1e-5
     assert np.abs(np.array(reached) - reached[0]).max() < 1e-5
-    for name, first_said in others[0].items():
-        assert np.abs(np.array([said[name] for said in others]) - first_said).max() < 1e-5, name
+    for each in (others, files):
+        for name, first_said in each[0].items():
+            assert np.abs(np.array([said[name] for said in each]) - first_said).max() < 1e-5, name
 
 
 def test_a_calibration_whose_point_is_gone_is_refused(tmp_path: Path, run) -> None:

@@ -316,8 +316,8 @@ def poses_where_it_holds(robot: CalibratedRobot, model: RobotModel, *, near: boo
             inside, there = random_poses(model, point, rng, ranges)
             if there == within:
                 far, inside = far[: SAMPLES // 2], inside[: SAMPLES // 2]
-                where += f", {len(inside)} of them within the joint ranges of the calibration"
-                return np.concatenate([far, inside]), where
+                among = f"{where}, {len(inside)} of them" if len(far) else f"{within}, all"
+                return np.concatenate([far, inside]), f"{among} within the joint ranges of the calibration"
         return (far, where) if len(far) >= _ENOUGH else (q, within)
 
     return draw

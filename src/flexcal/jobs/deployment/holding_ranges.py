@@ -51,11 +51,13 @@ def holding_ranges(robot: CalibratedRobot, model: RobotModel) -> dict[str, np.nd
         if holds(np.ones(model.n), point):
             continue
         shares = np.zeros(model.n) if holds(np.zeros(model.n), point) else np.full(model.n, -1.0)
-        for _ in range(2 * _STEPS):
+        growing = True
+        while growing:
+            growing = False
             for joint in range(model.n):
                 grown = shares.copy()
                 grown[joint] = min(grown[joint] + 1 / _STEPS, 1)
                 if grown[joint] > shares[joint] and holds(grown, point):
-                    shares = grown
+                    shares, growing = grown, True
         found[point] = np.where(shares == 1, [[-np.inf], [np.inf]], ends(shares))
     return found
