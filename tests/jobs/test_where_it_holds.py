@@ -62,6 +62,15 @@ def test_an_export_says_that_the_poses_it_is_for_are_beyond(
         assert SAYS not in export_robot(robot, tmp_path / "robot.json", "json").summary()
 
 
+def test_no_pose_is_said_to_be_where_it_holds_if_none_is(
+    nominal: RobotModel, examples: Path, tmp_path: Path
+) -> None:
+    robot = calibrate(nominal, poses_within(nominal, examples, 0.03, 60), terms=["kinematic"]).robot
+    said = export_robot(robot, tmp_path / "robot.json", "json").summary()
+    assert "at 2000 of 2000 random poses" in said and "where the calibration holds" not in said
+    assert "1000 random poses of the joint range, all within the joint ranges of the calibration" in said
+
+
 def test_a_certificate_says_which_points_are_beyond(
     narrow: CalibratedRobot, nominal: RobotModel, examples: Path
 ) -> None:

@@ -20,8 +20,9 @@ def beyond_calibration(
 ) -> np.ndarray:
     """Predicted errors (N,), m, at poses `q` (N, n) where these are above three times those at the poses of the calibration, else 0.
 
-    Of the `targets` (N,), by default the first point; of frames that are no points 0. All are 0 where the calibration does not say how
-    large errors are at its poses.
+    Of the `targets` (N,), by default the first measured point; of frames that are no points 0. All are 0 where the calibration does not
+    say how large errors are at its poses. How the flange is turned and where a point lies on it, where no measured point tells, is the
+    same at all poses, and part of the errors but not of the comparison.
     """
     if targets is not None:
         found = np.zeros(len(q))
@@ -40,12 +41,16 @@ def _beyond(calibrated: CalibratedRobot, q: np.ndarray, target: str | None) -> n
     ):
         return np.zeros(len(q))
     inside = calibrated.blocks["calibration"].ranges[PREDICTED][0]
+    robot, name = calibrated.probable, target or next(iter(calibrated.measured), None)
     try:
-        reach = propagation(calibrated.probable, target=target)
+        errors = predicted_rms(propagation(robot, target=name), q)
+        compared = errors
+        if name not in calibrated.measured and calibrated.unseen is not robot:
+            everywhere = predicted_rms(propagation(calibrated.unseen, target=name), q)
+            compared = np.sqrt(np.maximum(errors**2 - everywhere**2, 0.0))
     except FlexcalError:
         return np.zeros(len(q))
-    errors = predicted_rms(reach, q)
-    return np.where(errors > BEYOND * inside, errors, 0.0)
+    return np.where(compared > BEYOND * inside, errors, 0.0)
 
 
 def beyond_remark(calibrated: CalibratedRobot, errors: np.ndarray, what: str) -> tuple[str, ...]:
