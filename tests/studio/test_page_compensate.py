@@ -18,6 +18,7 @@ from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import write_poses
 from flexcal.jobs.deployment import compensate
 from flexcal.jobs.inputs import CalibratedRobot
+from flexcal.studio.steps.verify.corrected_command import CorrectedCommand, TypedTarget
 
 _TYPE_WHILE_BUSY = """([field, text]) => setTimeout(() => {
     const until = performance.now() + 400, set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set
@@ -90,6 +91,10 @@ def test_targets_and_places_where_the_calibration_does_not_hold_are_marked(page:
     targets = ToolTargets(poses.pose, poses.target, q=poses.q)
     far = {str(pose) for pose in poses.pose[compensate(robot, targets).extrapolated > 0]}
     assert 3 < len(far) < 12
+    near = read_poses(folder / "grid.csv", robot.model).q[0]
+    for q, beyond in ((near, False), (near - 0.8, True)):
+        typed = TypedTarget.of_tool(robot.with_points, q, "smr")
+        assert CorrectedCommand.of(robot, typed, q).beyond is beyond
     header = {"pose": poses.pose} | {f"q{k + 1}": poses.q[:, k] for k in range(6)}
     pl.DataFrame(header).write_csv(folder / "targets.csv")
     with studio(folder) as running:
