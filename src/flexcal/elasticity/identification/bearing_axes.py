@@ -74,8 +74,8 @@ class ResponseBearings:
     @property
     def share_of_other(self) -> float:
         """Probability that those not taken are the true ones where nothing is declared: their weight in a mean of both (Buckland et al.
-        1997). It follows from the normal distribution of the statistic, unless errors of the model are `coherent`: they prefer wrong
-        axes about as often as right ones, as long as the preference is not significant.
+        1997). It follows from the normal distribution of the statistic, unless errors of the model are `coherent`: over few clusters that
+        lack the same, a preference that is not significant says nothing.
         """
         return 0.5 if self.coherent else NormalDist().cdf(-abs(self.statistic))
 
