@@ -10,7 +10,6 @@ import numpy as np
 from flexcal.data.plans import MultisinePlan
 from flexcal.elasticity.identification.bearing_axes import ResponseBearings, with_fitting_bearings
 from flexcal.elasticity.identification.fit import (
-    FINE,
     ResponseData,
     ResponseFit,
     final_fit,
@@ -344,7 +343,8 @@ def _widened(
     misfit = find_misfit(likelihood, data.responses)
     wider = std
     if problem.groups is not None and len(np.unique(problem.groups)) > len(fitted.parameters) + 1:
-        robust = solve(problem, starts=fit.x[None], covariance="sandwich", tolerance=FINE)
+        # at the optimum: no offset is above 1
+        robust = solve(problem, starts=fit.x[None], covariance="sandwich", tolerance=1.0)
         wider = np.sqrt(np.diag(robust.covariance))
     if misfit is not None:
         wider = np.maximum(wider, misfit_std(fit, misfit))
