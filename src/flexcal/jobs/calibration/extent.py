@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.accuracy import predicted_rms, random_poses_in
-from flexcal.calibration.fit import GeometricFit, are_tracked
+from flexcal.calibration.fit import GeometricFit
 from flexcal.calibration.measurement import propagation
 from flexcal.errors import FlexcalError
 from flexcal.jobs.calibration.joint_ranges import joint_extents
@@ -65,7 +65,7 @@ class Extent:
         points = point_kinematics(model, inside, point=target, jacobians=False).position
         around = np.array([points.min(axis=0), points.max(axis=0)])
         rms = [float(np.sqrt(np.mean(predicted_rms(reach, at) ** 2))) for at in (inside, q)]
-        corrected = _corrected(fit, q, target) if are_tracked(poses) else None
+        corrected = _corrected(fit, q, target)
         return cls(rms[0], rms[1], box is not None, _partial_ranges(model, own), around, corrected)
 
     @property
