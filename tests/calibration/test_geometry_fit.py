@@ -9,6 +9,7 @@ import pytest
 from over_seeds import over_seeds
 from refusals import refused
 
+from flexcal import calibrate
 from flexcal.calibration.diagnostics import deviations_from_prior, implausible_shifts
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import ElasticPrior, GeometricFit, fit_geometry
@@ -311,6 +312,22 @@ def test_a_fit_that_turned_an_axis_round_is_remarked(ur5: RobotModel, examples: 
     # which of the axes that are turned round with it comes first is rounding
     turned = [item for item in implausible_shifts(found) if abs(abs(item.value) - np.pi) < 0.02]
     assert any(item.name.startswith("wrist_1_joint.misalignment") for item in turned)
+
+
+@pytest.mark.parametrize("wrong", ["half of them lower", "in another order"])
+def test_wrong_readings_of_an_elastic_arm_are_not_explained(
+    wrong: str, simulate: Callable, tx90l: RobotModel
+) -> None:
+    """The springs once went to zero or beyond all numbers, and robot.yaml was to be corrected where the readings are wrong."""
+    poses = simulate(2, 25).poses
+    order = np.random.default_rng(2).permutation(25)
+    position = {
+        "half of them lower": poses.position - 0.3 * np.outer(np.arange(25) >= 12, [0, 0, 1]),
+        "in another order": poses.position[order],
+    }[wrong]
+    found = calibrate(tx90l, replace(poses, position=position), terms=["kinematic"])
+    assert found.trust.status == "bad"
+    assert found.trust.because == "the robot as declared does not explain the measured points"
 
 
 def test_a_spring_far_from_what_stage_one_said_is_remarked(simulate: Callable, tx90l: RobotModel) -> None:

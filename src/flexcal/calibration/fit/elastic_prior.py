@@ -19,6 +19,9 @@ from flexcal.model.robot import (
     unit_of,
 )
 
+_FARTHEST = 10.0
+"""Standard deviations, as declared, by which stiffness and inertia are at most off."""
+
 
 @dataclass(frozen=True, eq=False)
 class ElasticPrior:
@@ -35,7 +38,7 @@ class ElasticPrior:
         response: it widens the drive stiffnesses by one scale each.
         """
         names = _names(model, poses)
-        items = [declared_parameter(model, name) for name in names]
+        items = [_bounded(declared_parameter(model, name)) for name in names]
         posterior = model.posterior
         covariance = posterior.prior(Parameters(items))[1]
         items = [replace(i, prior_std=np.inf) if posterior.determines(i.name) else i for i in items]
@@ -69,6 +72,13 @@ class ElasticPrior:
         whole = np.zeros((size + len(items), size + len(items)))
         whole[:size, :size], whole[size:, size:] = self.covariance, covariance
         return ElasticPrior(self.parameters + items, whole)
+
+
+def _bounded(item: Parameter) -> Parameter:
+    """The same parameter within some declared deviations: wrong readings are to show as such, not as an arm that collapses."""
+    at, far = item.coordinate(item.value), _FARTHEST * item.prior_std
+    lower, upper = item.natural(at - far), item.natural(at + far)
+    return replace(item, lower=max(item.lower, lower), upper=min(item.upper, upper))
 
 
 def with_instruments(prior: ElasticPrior, model: RobotModel, poses: PoseSet) -> ElasticPrior:
