@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from test_hardening_drives import still_plan
 
+from flexcal.data.plans import MultisinePlan
 from flexcal.elasticity.identification import MultiStart, fit_springs
 from flexcal.elasticity.response_model import ResponseModel, Tolerances, stiffness_parameters
-from flexcal.elasticity.time_periodic import SlippingSprings
+from flexcal.elasticity.time_periodic import DriveTorque, SlippingSprings
 from flexcal.elasticity.time_periodic.slipping_springs import LIMITS
 from flexcal.jobs.experiments import frequency_plan
 from flexcal.model.robot import RobotModel
@@ -144,6 +145,26 @@ def test_hysteresis_is_found_and_not_invented(
         assert true or std < 0.01
 
 
+def check_loss(loaded: ResponseModel, x: np.ndarray, plan: MultisinePlan) -> None:
+    """The damping of a drive changes by what an element simulated here loses under the same twists."""
+    (pose,), natural = loaded.poses, loaded.parameters.natural(x)
+    torque = DriveTorque.of(
+        loaded.robot.with_values(pose.values(loaded.robot, natural)[0]), pose.q, pose.payload, plan
+    )
+    k, d = (loaded.robot.value(f"joint_2.drive.{name}") for name in ("stiffness", "damping"))
+    time = np.arange(0, 20, 1 / 2560)
+    phases = np.random.default_rng(8).uniform(0, 2 * np.pi, len(plan.frequencies_hz))
+    waves = torque.lines[:, 1] / torque.stiffness[1] * np.exp(1j * phases)
+    turning = np.exp(2j * np.pi * np.outer(time, plan.frequencies_hz))
+    cycle = (plan.reference_frequency_hz * time) % 1.0
+    slow = np.interp(cycle, np.arange(64) / 64, torque.slow[:, 1] / k, period=1.0)
+    extension = slipped(np.real(turning @ waves) + slow, 1.3e-4)
+    rate = np.real(turning @ (2j * np.pi * plan.frequencies_hz * waves))
+    loss = 0.3 * k / d * (extension @ rate) / (rate @ rate)
+    assert loss > 0.1
+    assert loaded.damping_changes(x)["joint_2"] == pytest.approx(loss, rel=0.2)
+
+
 def test_a_stiffness_changes_the_gains_by_the_torque_at_which_springs_slip(
     stiff: RobotModel, poses, synthesise, examples: Path
 ) -> None:
@@ -157,6 +178,7 @@ def test_a_stiffness_changes_the_gains_by_the_torque_at_which_springs_slip(
     x = parameters.coordinates({n: names.get(n.rpartition(".")[2], v) for n, v in values.items()})
     at_rest = ResponseModel.of(model, responses, parameters)
     loaded = at_rest.with_loaded_drives(x, plan)
+    check_loss(loaded, x, plan)
     columns = loaded.predict(x)[0]
     for joint in range(1, 4):
         number = parameters.index(f"joint_{joint}.drive.stiffness")

@@ -354,6 +354,10 @@ def _widened(
         wider = wider if scatter is None else np.hypot(wider, scatter)
         drives = [name.endswith(".drive.stiffness") for name in fitted.parameters.names]
         wider = np.maximum(wider, np.where(drives, UNSLIPPED, 0.0))
+        # a loss by slip that errs alike in all poses is taken for damping
+        lost = fit.residual.model.damping_changes(fit.x)
+        share = [abs(lost.get(name.removesuffix(".drive.damping"), 0.0)) for name in fitted.parameters.names]
+        wider = np.hypot(wider, data.tolerances.hysteresis * np.array(share))
     factor = np.divide(wider, std, out=np.ones_like(std), where=std > 0)
     factor = np.maximum(factor, np.sqrt(excess)) * profile_std_ratio(problem, fitted, std)
     springs = np.array([name.endswith(SPRING_VALUES) for name in fitted.parameters.names])

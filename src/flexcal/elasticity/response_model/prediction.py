@@ -378,6 +378,17 @@ class ResponseModel:
             )
         return replace(self, poses=tuple(poses))
 
+    def damping_changes(self, x: np.ndarray) -> dict[str, float]:
+        """Relative change of the damping of drives, by joint, by slipping springs and open gaps at the coordinates x (p,), on the mean over
+        poses."""
+        natural, poses = self.parameters.natural(x), len(self.poses)
+        changes: dict[str, float] = {}
+        for pose in self.poses:
+            for joint, drive in pose.drives(self.robot, natural).items():
+                own = pose.at_no_load(self.robot, natural, joint)[1]
+                changes[joint] = changes.get(joint, 0.0) + (drive.damping / own - 1) / poses
+        return changes
+
     @cached_property
     def _arm(self) -> ElasticArm:
         """Arm of the robot; those of all poses differ in values alone."""
