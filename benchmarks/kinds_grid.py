@@ -1,6 +1,6 @@
 """How many readings, how good, what accuracy: points, full poses, wires, sockets, touched faces, views of a board.
 
-`python -m benchmarks.kinds_grid [--kinds wires sockets …] [--robots 10] [--first 0] [--processes 2]`
+`python -m benchmarks.kinds_grid [--kinds wires sockets …] [--sizes 12 …] [--robots 10] [--first 0] [--processes 2]`
 
 Robots are of the tests' simulators, with axes off by 0.3 to 0.5 mm and 0.5 to 1 mrad. Errors are those of the point at fresh poses after
 the best rigid placement of the base, which some kinds do not tell, beside those of the nominal robot with base and point found from the
@@ -130,6 +130,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--kinds", nargs="+", default=list(ROWS), choices=list(ROWS))
+    parser.add_argument("--sizes", type=int, nargs="+", default=SIZES)
     parser.add_argument("--robots", type=int, default=10)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--processes", type=int, default=os.cpu_count())
@@ -137,7 +138,7 @@ def main() -> None:
     tasks = [
         (kind, ROWS[kind] * size, noise, seed)
         for kind in given.kinds
-        for size in SIZES
+        for size in given.sizes
         for noise in NOISES_UM
         for seed in range(given.first, given.first + given.robots)
     ]

@@ -14,12 +14,15 @@ from .point_fit import CONVERGED
 from .stratified_sample import StratifiedSample, all_errors
 from .temperature_evidence import TemperatureEvidence, sensor_scatter
 from .terms import (
+    LEAST_COORDINATES,
     LEAST_POSES,
     LEVELS,
     PER_JOINT,
     TOLERANCE,
     common_lengths,
+    coordinates,
     declared_size,
+    enough_for_terms,
     free_joints,
     geometric_parameters,
     loaded_compliances,
@@ -33,6 +36,7 @@ from .tolerance_prior import LENGTH_TOLERANCE, are_tracked, error_kind, with_tol
 __all__ = [
     "CONVERGED",
     "KNOWN_POINT_STD",
+    "LEAST_COORDINATES",
     "LEAST_POSES",
     "LENGTH_TOLERANCE",
     "LEVELS",
@@ -50,7 +54,9 @@ __all__ = [
     "are_tracked",
     "base_errors",
     "common_lengths",
+    "coordinates",
     "declared_size",
+    "enough_for_terms",
     "error_kind",
     "fit_geometry",
     "free_joints",

@@ -13,7 +13,6 @@ from flexcal.calibration.error_model import (
     TRANSMISSION,
     ErrorComponents,
     ErrorGroups,
-    are_different,
     joint_rotation_jacobian,
 )
 from flexcal.calibration.fit.elastic_prior import ElasticPrior, with_instruments
@@ -30,8 +29,8 @@ from flexcal.calibration.fit.structural_identifiability import (
     require_enough,
 )
 from flexcal.calibration.fit.terms import (
-    LEAST_POSES,
     declared_size,
+    enough_for_terms,
     geometric_parameters,
     lag_parameters,
     plausible_size,
@@ -111,14 +110,14 @@ class PointFit:
         fleet: FleetPrior | None = None,
         kinds: Mapping[str, str] | None = None,
     ) -> PointFit:
-        """Input without the term `transmission` for fewer than 20 different poses, which do not determine its variance.
+        """Input without the term `transmission` for few poses, which do not determine its variance.
 
         Instruments stand and targets are mounted as on the robot that is `placed` already, if any, and else as registration finds them;
         of parameters that cannot be told apart those `kept` in another fit come first.
 
         Raises `FlexcalError` for a backlash seen from one flank and for too few poses.
         """
-        if not are_different(poses.q, LEAST_POSES):
+        if not enough_for_terms(poses):
             terms = tuple(term for term in terms if term != TRANSMISSION)
         model = model.with_stations(poses.places)
         model = model.with_lenses({name: lens.values for name, lens in poses.lenses.items()})

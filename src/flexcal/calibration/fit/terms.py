@@ -7,10 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from flexcal.calibration.error_model import are_different
 from flexcal.calibration.fit.base_placement import base_errors
 from flexcal.calibration.fit.thermal_terms import THERMAL, plausible_thermal_size, thermal_parameters
 from flexcal.calibration.kinds import ANGULAR, KINDS, declared_level, kind_of
-from flexcal.calibration.measurement import predict_measurements
+from flexcal.calibration.measurement import Readings, predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.parts import LOOP
@@ -34,8 +35,8 @@ from flexcal.model.statics import (
     lateral_axes,
 )
 
-LEAST_POSES = 20
-"""Least number of different poses for a selection of terms and for the variance of transmission errors."""
+LEAST_POSES, LEAST_COORDINATES = 20, 60
+"""Least numbers of different poses, and of measured coordinates, for a selection of terms and for the variance of transmission errors."""
 
 TOLERANCE = {
     "m": 3e-4,
@@ -61,6 +62,16 @@ _LOADED = 0.01
 """Least standard deviation of a gravity load, relative to the largest, at which its compliance is separable from a constant."""
 _LEAST_LOAD = 1e-6
 """Load, N m, below which it is a rounding error."""
+
+
+def enough_for_terms(poses: PoseSet) -> bool:
+    """Whether there are enough poses, and numbers read at them, for a selection of terms and for the variance of transmission errors."""
+    return are_different(poses.q, LEAST_POSES) and coordinates(poses) >= LEAST_COORDINATES
+
+
+def coordinates(poses: PoseSet) -> int:
+    """Number of measured coordinates."""
+    return int(Readings.of(poses).present.sum())
 
 
 def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> Parameters:

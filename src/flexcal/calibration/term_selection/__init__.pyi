@@ -3,7 +3,6 @@ from .cross_validation import (
     CrossValidation,
     TermSelection,
     cross_validated,
-    enough_for_selection,
     select_terms,
 )
 from .stored_trials import considered_document, considered_terms
@@ -17,6 +16,5 @@ __all__ = [
     "considered_document",
     "considered_terms",
     "cross_validated",
-    "enough_for_selection",
     "select_terms",
 ]

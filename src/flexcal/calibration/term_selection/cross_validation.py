@@ -6,8 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.error_model import are_different, order_folds, repeated_pose_numbers, workspace_folds
-from flexcal.calibration.fit import LEAST_POSES, THERMAL, GeometricFit, fit_geometry
+from flexcal.calibration.error_model import order_folds, repeated_pose_numbers, workspace_folds
+from flexcal.calibration.fit import (
+    LEAST_COORDINATES,
+    LEAST_POSES,
+    THERMAL,
+    GeometricFit,
+    coordinates,
+    enough_for_terms,
+    fit_geometry,
+)
 from flexcal.calibration.measurement import Readings
 from flexcal.calibration.term_selection.candidates import candidates
 from flexcal.calibration.term_selection.trials import TermComparison, TermTrials, not_tried
@@ -76,7 +84,7 @@ class CrossValidation:
 
 
 def cross_validated(fit: GeometricFit) -> CrossValidation | None:
-    """Cross-validation of a fit with all its terms, linearised and without its outliers; None with fewer than 20 different poses, unless
+    """Cross-validation of a fit with all its terms, linearised and without its outliers; None with few poses (`enough_for_terms`), unless
     all parameters have a prior.
     """
     rows = np.setdiff1d(np.arange(len(fit.poses)), list(fit.estimate.outliers))
@@ -84,7 +92,7 @@ def cross_validated(fit: GeometricFit) -> CrossValidation | None:
         fit, poses=fit.poses.subset(rows), readings=fit.readings[np.isin(Readings.of(fit.poses).row, rows)]
     )
     folds, distinct = folds_of(inside.poses)
-    if distinct < LEAST_POSES and not fit.by_prior:
+    if not enough_for_terms(inside.poses) and not fit.by_prior:
         return None
     by = left_out_by(inside.poses, distinct)
     trials = TermTrials(inside, fit.model, fit.terms, folds, by=by)
@@ -115,11 +123,6 @@ def left_out_by(poses: PoseSet, distinct: int) -> str:
     return "places" if poses.in_socket.all() else "folds"
 
 
-def enough_for_selection(poses: PoseSet) -> bool:
-    """Whether there are enough different poses for a selection of terms by cross-validation."""
-    return are_different(poses.q, LEAST_POSES)
-
-
 def select_terms(
     model: RobotModel,
     poses: PoseSet,
@@ -132,7 +135,8 @@ def select_terms(
     Bayesian information criterion, and does not raise the largest left-out error. Fewer than 80 different poses are left out one by one,
     more in folds contiguous in measuring order and in the workspace, where both must agree. Fits are linear, about the fit of the base
     terms to all poses by squares. Compliances that are not supported for all joints are tried joint by joint, and must then lower the
-    criterion by 2 log(number of such candidates) more (Chen and Chen 2008). Fewer than 20 different poses support no choice.
+    criterion by 2 log(number of such candidates) more (Chen and Chen 2008). Fewer than 20 different poses, or 60
+    coordinates, support no choice.
 
     `fitted` is a fit of the base terms to these poses, or more, without springs: where there is one it is the one, or its start. `assumed`
     are terms that are fitted by their prior in any case.
@@ -145,9 +149,8 @@ def select_terms(
     """
     base = ("kinematic", *(("backlash",) if model.backlash_joints else ()))
     folds, distinct = folds_of(poses)
-    if distinct < LEAST_POSES:
-        remark = _too_few(distinct, LEAST_POSES - distinct, assumed)
-        return TermSelection((*base, *assumed), model, (), "nothing", remark)
+    if not enough_for_terms(poses):
+        return TermSelection((*base, *assumed), model, (), "nothing", _too_few(poses, distinct, assumed))
     if fitted is not None and len(fitted.poses) == len(poses) and not model.elastic:
         rigid = fitted
     else:
@@ -205,14 +208,21 @@ def select_terms(
     return TermSelection(chosen, kept, (*rows, *left.values(), *excluded), by, "")
 
 
-def _too_few(distinct: int, more: int, assumed: tuple[str, ...]) -> str:
-    few = f"{distinct} different poses are too few for cross-validation"
+def _too_few(poses: PoseSet, distinct: int, assumed: tuple[str, ...]) -> str:
+    few, more = (
+        f"{distinct} different poses are too few for cross-validation",
+        f"{LEAST_POSES - distinct} more",
+    )
+    if distinct >= LEAST_POSES:
+        numbers = coordinates(poses)
+        few = f"{numbers} coordinates are too few for cross-validation"
+        more = f"{int(np.ceil((LEAST_COORDINATES - numbers) * len(poses) / numbers))} more poses"
     if not assumed:
         return (
-            f"terms beyond kinematics were not tried: {few}; measure {more} more, so that compliance under gravity, backlash and "
+            f"terms beyond kinematics were not tried: {few}; measure {more}, so that compliance under gravity, backlash and "
             "transmission errors can be considered"
         )
     return (
         f"{few}, so terms were not chosen: compliance under gravity of every joint is estimated as likely as its prior and the points make "
-        f"it; measure {more} more, so that backlash and transmission errors can be considered too"
+        f"it; measure {more}, so that backlash and transmission errors can be considered too"
     )

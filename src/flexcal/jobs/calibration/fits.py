@@ -18,17 +18,14 @@ from flexcal.calibration.fit import (
     LossName,
     StratifiedSample,
     are_tracked,
+    enough_for_terms,
     fit_geometry,
     geometric_parameters,
     with_tolerance_prior,
 )
 from flexcal.calibration.kinds import LEAST_REGISTERED
 from flexcal.calibration.measurement import OneFlank
-from flexcal.calibration.term_selection import (
-    TermSelection,
-    enough_for_selection,
-    select_terms,
-)
+from flexcal.calibration.term_selection import TermSelection, select_terms
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.jobs.calibration.remarks import outlying_stations
@@ -94,7 +91,7 @@ class Fits:
         assumed = (
             (_YIELDING,)
             if informed is not None
-            and (are_tracked(poses) or not enough_for_selection(poses))
+            and (are_tracked(poses) or not enough_for_terms(poses))
             and any(n.endswith(_YIELDING) for n in geometric_parameters(model, poses, (_YIELDING,)).names)
             else ()
         )
