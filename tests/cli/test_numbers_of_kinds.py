@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from over_seeds import over_seeds
+from refusals import refused
 from stranger_readings import Asked, ReadArm, readings, right
 
 from flexcal import PoseSet, RobotModel, calibrate, read_poses
@@ -110,6 +113,26 @@ def verdict(seed: int, folder: Path, asked: Sequence[Asked], prior: str) -> tupl
     poses = read_poses(sorted(model.path.parent.glob("*.csv")), robot)
     found = calibrate(robot, poses, terms=["auto"])
     return found.trust.status, found.is_implausible
+
+
+@pytest.mark.parametrize("kind", ["sockets", "wires", "plane"])
+def test_zeros_that_were_set_by_eye_are_found_and_a_reversed_joint_is_not_believed(
+    tmp_path: Path, kind: str
+) -> None:
+    """By readings without an instrument of points too, for which they once were implausible, or a link of another length."""
+    arm = ReadArm.drawn(2)
+    arm.zeros[[1, 4]] += np.deg2rad([-3.4, -6.0])
+    model, poses = readings(tmp_path, arm, [right(kind, 180)], 2)
+    found = calibrate(model, poses, terms=["auto"])
+    assert found.trust.status == "good"
+    (said,) = (remark for remark in found.document()["remarks"] if remark.startswith("joint zeros are far"))
+    assert re.findall(r"(a\d) ", said.partition(";")[0]) == ["a5", "a2"]
+    reversed_ = replace(poses, q=poses.q * [1, 1, 1, -1, 1, 1])
+    if kind == "sockets":
+        assert calibrate(model, reversed_, terms=["auto"]).trust.status == "bad"
+    else:
+        with refused("E-CAL-023"):
+            calibrate(model, reversed_, terms=["auto"])
 
 
 PRIORS = ("", "prior: {length: 0.0005, angle: 0.001}\n")

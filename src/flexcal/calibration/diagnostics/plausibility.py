@@ -19,7 +19,6 @@ from flexcal.calibration.measurement import predict_measurements
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.kinematics import found_xyz
 from flexcal.model.parts import vector_rotation
-from flexcal.model.robot import RobotModel
 
 FAR = 50.0
 """Largest plausible deviation of a geometric parameter, in tolerances: 15 mm, 25 mrad."""
@@ -34,7 +33,7 @@ NOISY = 3.0
 """Ratio of errors after the fit to the known noise of a camera's single views below which they are that noise."""
 
 FAR_ZERO = 0.6
-"""Largest plausible error of a joint zero, rad, where the residuals are plausible: zeros that were set by eye."""
+"""Largest plausible error of a joint zero that was set by eye, rad, where the residuals are plausible."""
 
 PLAY = 6e-3
 """Error after the fit, m (root mean square of a coordinate), up to which play in the joints of small arms explains it."""
@@ -98,36 +97,34 @@ def _in_base(calibration: GeometricFit) -> np.ndarray:
 def implausible_shifts(calibration: GeometricFit) -> tuple[ImplausibleShift, ...]:
     """Parameters with an implausibly large change from their start values, the largest first, and far places of points.
 
-    Where the residuals are plausible, beyond what the noise of the estimate (2σ) explains. A change that moves the measured points by no
-    more than is plausible is none, and neither is what another place of the base or of a point looks like.
+    Where the residuals are plausible, beyond what the noise of the estimate (2σ) explains, and beside `far_zeros`. A change that moves the
+    measured points by no more than is plausible is none, and neither is what another place of the base or of a point looks like.
     """
-    estimate, poses = calibration.estimate.parameters, calibration.poses
-    regrouped = _regrouped_shifts(calibration)
+    estimate = calibration.estimate.parameters
+    plausible = not residuals_implausible(calibration)
+    regrouped = _regrouped_shifts(calibration, without_zeros=plausible)
     waves = [name for name in calibration.prior.parameters.names if _WAVE in name]
     names = [name for name in calibration.identifiability.kept_names if _has_size(name)]
     kept = estimate.subset([*names, *waves])
     shift = {p.name: float(d) for p, d in zip(estimate, _changes(estimate), strict=True)}
     shift |= {name: regrouped[name][0] for name in names}
     sizes = dict(zip(kept.names, manufacturing_tolerances(kept).tolist(), strict=True))
-    limit = dict.fromkeys(kept.names, FAR)
     noise = {name: 0.0 for name in kept.names}
-    if not residuals_implausible(calibration):
+    if plausible:
         noise |= {name: regrouped[name][1] for name in names}
         noise |= {name: calibration.estimate.std(name) or 0.0 for name in waves}
-        if poses.located.all():
-            limit |= {name: FAR_ZERO / TOLERANCE["rad"] for name in _zeros(calibration.model)}
-    far = [n for n in kept.names if abs(shift[n]) - 2 * noise[n] > limit[n] * sizes[n]]
+    far = [n for n in kept.names if abs(shift[n]) - 2 * noise[n] > FAR * sizes[n]]
     found = [_shifted(estimate[n], shift[n], abs(shift[n]) / sizes[n]) for n in far]
     found += deviations_from_prior(calibration)
     moved = displacements(calibration, {s.name: shift[s.name] for s in found})
     least = _shown(calibration)
     found = [s for s, own in zip(found, moved, strict=True) if own > least]
-    found.sort(key=lambda s: -s.times / limit.get(s.name, FAR_FROM_PRIOR))
+    found.sort(key=lambda s: -s.times / (FAR if s.name in far else FAR_FROM_PRIOR))
     return (*found, *_far_points(calibration))
 
 
-def _regrouped_shifts(calibration: GeometricFit) -> dict[str, tuple[float, float]]:
-    """Change of each kept parameter, natural units, with its standard deviation.
+def _regrouped_shifts(calibration: GeometricFit, *, without_zeros: bool) -> dict[str, tuple[float, float]]:
+    """Change of each kept parameter, natural units, with its standard deviation, `without_zeros` that were set by eye.
 
     Where priors leave the dropped ones free they share its change, and one wrong length is none that is far off: it has theirs too.
     """
@@ -138,7 +135,11 @@ def _regrouped_shifts(calibration: GeometricFit) -> dict[str, tuple[float, float
     regrouping = seen.regrouping[:, alike]
     rows = [places[item.name] for item in items]
     spread = regrouping @ estimate.covariance[np.ix_(rows, rows)] @ regrouping.T
-    shift = regrouping @ (items.coordinates() - items.prior_mean())
+    changes = items.coordinates() - items.prior_mean()
+    by_eye = [zero for zero in far_zeros(calibration) if abs(zero.error) <= FAR_ZERO] if without_zeros else ()
+    for zero in by_eye:
+        changes[items.index(f"{zero.joint}.offset")] = 0.0
+    shift = regrouping @ changes
     stds = np.sqrt(np.maximum(np.diag(spread), 0.0))
     return dict(zip(seen.kept_names, zip(shift.tolist(), stds.tolist(), strict=True), strict=True))
 
@@ -206,10 +207,6 @@ def _far_points(calibration: GeometricFit) -> list[ImplausibleShift]:
     return found
 
 
-def _zeros(model: RobotModel) -> tuple[str, ...]:
-    return tuple(f"{joint.name}.offset" for joint in model.joints if joint.kind == "revolute")
-
-
 @dataclass(frozen=True)
 class FarZero:
     """Joint whose zero is far from that of the URDF, by the `error` with the half width of its 95 % interval, rad."""
@@ -232,8 +229,11 @@ def far_zeros(calibration: GeometricFit) -> tuple[FarZero, ...]:
             continue
         interval, start = estimate.interval(name), estimate.parameters.subset([name]).prior_mean()
         error = estimate.values[name] - float(start[0])
-        if interval is not None and abs(error) > FAR * TOLERANCE["rad"]:
-            found.append(FarZero(joint.name, error, (interval[1] - interval[0]) / 2))
+        if interval is None:
+            continue
+        half = (interval[1] - interval[0]) / 2
+        if abs(error) > max(FAR * TOLERANCE["rad"], half):
+            found.append(FarZero(joint.name, error, half))
     return tuple(sorted(found, key=lambda zero: -abs(zero.error)))
 
 

@@ -46,7 +46,7 @@ def require_fitting(model: RobotModel, name: str, misfit: np.ndarray, targets: n
         raise FlexcalError(
             "E-CAL-023",
             f"the readings of '{name}' differ by {away / MILLIMETRE:.0f} mm (median) from those at any place: check their unit, the order "
-            "and units of the joint positions, and the measured point under `points:`.",
+            "and units of the joint positions, the joints' zeros, and the measured point under `points:`.",
         )
 
 
