@@ -67,7 +67,7 @@ class LinearBasis:
         """Basis with a further block (N, 3, k) of columns.
 
         `penalty` is the factor on the sum of squared coefficients of the block, m²: of a prior, with the columns in its standard
-        deviations; 0 for none. Projected off the others twice, which is as accurate as reflections (Giraud & Langou 2005).
+        deviations; 0 for none. Projected off the others twice, which is as accurate as reflections (Giraud et al. 2005).
         """
         count, known = block.shape[2], len(self.variances)
         if not count:
