@@ -16,6 +16,8 @@ from flexcal.progress import Progress, silent
 
 _BATCH = 256
 """Poses processed together: their derivatives stay in the processor's cache and in reused memory."""
+_FEW = 2
+"""Number of batches up to which they are processed one after the other."""
 _DRAWN = 100_000
 _FEWEST = 1e-4
 """Share of all random poses below which a box counts as out of reach."""
@@ -84,9 +86,15 @@ def _in_batches(
     fill: Callable[[slice], None], count: int, threads: int | None = None, progress: Progress = silent
 ) -> None:
     """Call `fill` with the rows of every batch of `count` poses, in `threads`; None takes all cores."""
+    starts = range(0, count, _BATCH)
+    if len(starts) <= _FEW:
+        # threads would take longer to start
+        for start in starts:
+            fill(slice(start, start + _BATCH))
+        progress("accuracy map", 1.0)
+        return
     from concurrent.futures import ThreadPoolExecutor
 
-    starts = range(0, count, _BATCH)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         batches = pool.map(lambda start: fill(slice(start, start + _BATCH)), starts)
         for number, _ in enumerate(batches, start=1):
