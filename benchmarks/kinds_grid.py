@@ -26,7 +26,7 @@ import numpy as np
 
 from benchmarks._tasks import in_parallel
 from benchmarks.few_poses import FRESH
-from benchmarks.pose_grid import Tried
+from benchmarks.pose_grid import Tried, verdicts
 from flexcal import PoseSet, RobotModel, calibrate, read_poses
 from flexcal.calibration.verification import uncalibrated_model
 from flexcal.errors import FlexcalError
@@ -150,13 +150,10 @@ def main() -> None:
     print(f"P90 before -> after, mm, median of {given.robots} robots; observed over predicted, rms of all")
     for (kind, rows, noise), own in cells.items():
         done = [t for t in own if not t.refused]
-        faults = [f for t in own for f in t.faults]
-        told = ", ".join(f"{f} {faults.count(f)}" for f in dict.fromkeys(faults))
         ratio = np.sqrt(np.mean([t.ratio**2 for t in done] or [np.nan]))
         print(
             f"{kind:>8} {rows:4d} rows, {noise:5g} µm: {np.median([t.before for t in done] or [np.nan]):.2f} -> "
-            f"{np.median([t.after for t in done] or [np.nan]):.3f}, {ratio:.2f}; good {sum(t.trust == 'good' for t in done)}, "
-            f"care {sum(t.trust == 'care' for t in done)}, no {sum(t.trust == 'bad' for t in done)}; {told or 'no fault'}"
+            f"{np.median([t.after for t in done] or [np.nan]):.3f}, {ratio:.2f}; {verdicts(own)}"
         )
 
 

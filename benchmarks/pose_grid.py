@@ -85,6 +85,15 @@ class Tried:
         return "\n    ".join([line, *(self.reasons if whole or "false no" in self.faults else ())])
 
 
+def verdicts(cell: list[Tried]) -> str:
+    """Number of every verdict, and of every fault, of some calibrations."""
+    faults = [fault for tried in cell for fault in tried.faults]
+    told = ", ".join(f"{fault} {faults.count(fault)}" for fault in dict.fromkeys(faults))
+    named = (("good", "good"), ("care", "care"), ("no", "bad"))
+    counts = (f"{name} {sum(t.trust == status for t in cell)}" for name, status in named)
+    return f"{', '.join(counts)}; {told or 'no fault'}"
+
+
 def drawn_arm(number: int) -> tuple[Body, ...]:
     """Three known arms, then arms of three to seven axes with random lengths, whose axes cross or follow each other at right angles."""
     known = (PANDA_LIKE, UR_LIKE, TX90L_LIKE)
@@ -175,12 +184,9 @@ def main() -> None:
     print(f"P90 before -> after, mm, median of {given.arms} arms")
     for (count, noise), own in cells.items():
         done = [t for t in own if not t.refused]
-        faults = [f for t in own for f in t.faults]
-        told = ", ".join(f"{f} {faults.count(f)}" for f in dict.fromkeys(faults))
         print(
             f"{count:6d} poses, {noise:6g} µm: {np.median([t.before for t in done] or [np.nan]):.3f} -> "
-            f"{np.median([t.after for t in done] or [np.nan]):.3f}; good {sum(t.trust == 'good' for t in done)}, "
-            f"care {sum(t.trust == 'care' for t in done)}, no {sum(t.trust == 'bad' for t in done)}; {told or 'no fault'}"
+            f"{np.median([t.after for t in done] or [np.nan]):.3f}; {verdicts(own)}"
         )
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration.fit.terms import manufacturing_tolerances
-from flexcal.calibration.measurement import Readings, predict_measurements
+from flexcal.calibration.fit.terms import coordinates, manufacturing_tolerances
+from flexcal.calibration.measurement import predict_measurements
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Identifiability, Parameters, analyse
@@ -74,7 +74,7 @@ def require_enough(
     model: RobotModel, poses: PoseSet, parameters: Parameters, identifiability: Identifiability
 ) -> None:
     """Raise `FlexcalError` if there are too few rows for the parameters that many random poses would determine."""
-    rows = int(Readings.of(poses).present.sum())
+    rows = coordinates(poses)
     if identifiability.rank < rows:
         return
     rank = random_identifiability(model, poses, parameters, identifiability).rank

@@ -209,14 +209,13 @@ def select_terms(
 
 
 def _too_few(poses: PoseSet, distinct: int, assumed: tuple[str, ...]) -> str:
-    few, more = (
-        f"{distinct} different poses are too few for cross-validation",
-        f"{LEAST_POSES - distinct} more",
-    )
-    if distinct >= LEAST_POSES:
+    if distinct < LEAST_POSES:
+        few, more = f"{distinct} different poses", f"{LEAST_POSES - distinct} more"
+    else:
         numbers = coordinates(poses)
-        few = f"{numbers} coordinates are too few for cross-validation"
+        few = f"{numbers} coordinates"
         more = f"{int(np.ceil((LEAST_COORDINATES - numbers) * len(poses) / numbers))} more poses"
+    few = f"{few} are too few for cross-validation"
     if not assumed:
         return (
             f"terms beyond kinematics were not tried: {few}; measure {more}, so that compliance under gravity, backlash and "

@@ -97,7 +97,7 @@ class TermTrials:
         self._out = [_PLACES_OUT if by == "places" else text for text in _OUT]
         self._columns: dict[str, np.ndarray] = {}
         self._fits: dict[tuple[str, ...], LeaveOutErrors] = {}
-        self._before: tuple[tuple[str, ...] | None, LinearBasis] = None, LinearBasis.of(np.zeros((0, 3)))
+        self._before: dict[tuple[str, ...], LinearBasis] = {}
         self._base = base
 
     def start(self) -> TermComparison:
@@ -157,9 +157,9 @@ class TermTrials:
         """Basis of some terms and of what has a prior; that without the last term is kept for others in its place."""
         if not terms:
             return LinearBasis.of(self._residual).extended(self._held, self._noise)
-        if self._before[0] != terms[:-1]:
-            self._before = terms[:-1], self._basis(terms[:-1])
-        return self._before[1].extended(self._block(terms[-1]), 0.0)
+        if terms[:-1] not in self._before:
+            self._before = {terms[:-1]: self._basis(terms[:-1])}
+        return self._before[terms[:-1]].extended(self._block(terms[-1]), 0.0)
 
     def _left_out(self, basis: LinearBasis) -> LeaveOutErrors:
         order, workspace, alone = self._row_folds
